@@ -264,7 +264,7 @@ def _check_parameters(experiment: Experiment, where: str) -> None:
             _check_table(experiment, use.head, TABLES[use.model], where)
         for name, word in _words(use) if use.kind in ("servo", "sensor") else ():
             _is_word(parameters, f"{use.head}.{name}", word, where)
-    relations.check_paths(experiment, where)
+    relations.check_guided_paths(experiment, where)
     _check_bodies(experiment, where)
 
 

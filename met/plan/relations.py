@@ -87,7 +87,7 @@ def _is_less(values: np.ndarray) -> np.ndarray:
     return np.asarray(values[:, 0] < values[:, 1])
 
 
-def check(structure: Structure, where: str) -> None:
+def check_guides(structure: Structure, where: str) -> None:
     """Check that guides and servos name each other, ticks are at instants, and courses are those of components. Raises
     Damaged."""
     for index, use in enumerate(structure.guides):
@@ -133,7 +133,7 @@ def check_courses(use: Base | GuideUse, components: Sequence[str], path: str) ->
         models.find("command", course.model, use.place)
 
 
-def check_paths(experiment: Experiment, where: str) -> None:
+def check_guided_paths(experiment: Experiment, where: str) -> None:
     """Raise Damaged unless the joints of each guide carry its link, and are at least as many as the guided
     components."""
     structure = experiment.structure

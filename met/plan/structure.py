@@ -32,7 +32,7 @@ def check(structure: Structure, where: str) -> None:
     _check_payloads(structure, f"{where}.payloads")
     _check_schedule(structure, where)
     _check_uses(structure, where)
-    relations.check(structure, where)
+    relations.check_guides(structure, where)
     _check_record(structure, f"{where}.record")
 
 
