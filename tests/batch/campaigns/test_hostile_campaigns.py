@@ -349,7 +349,7 @@ def test_a_case_that_failed_may_be_run_again_on_another_machine(here: Path, monk
             made.outputs[np.isnan(made.outputs)] = -made.outputs[np.isnan(made.outputs)]  # the other sign
         write(path, made)
 
-    monkeypatch.setattr(tasks, "write", elsewhere)
+    monkeypatch.setattr(tasks, "write_shard", elsewhere)
     batch.run(deck(here, DOOR), output="a.h5", histories="failed")
 
 

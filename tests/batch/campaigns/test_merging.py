@@ -24,7 +24,7 @@ def test_a_case_that_gives_other_numbers_when_it_is_run_again_stops_the_merge(
             made.outputs[1, -1] += 1e-12
         write(path, made)
 
-    monkeypatch.setattr(tasks, "write", wrong)
+    monkeypatch.setattr(tasks, "write_shard", wrong)
     with pytest.raises(Problem) as caught:
         batch.run(plans.plan(plans.gains(9)), output="a.h5", histories=["every:4"])
     [told] = caught.value.diagnostics

@@ -14,7 +14,7 @@ from typing import Any
 import pytest
 
 import batch
-from batch.campaigns import performing, tasks
+from batch.campaigns import folder, performing, tasks
 from met import cli
 from met.host.streams import OutputLost
 from met.plan import file as plan_file
@@ -153,7 +153,7 @@ def test_an_interrupt_while_shards_are_found_keeps_them(archive: Path, monkeypat
     monkeypatch.setattr(performing, "WORTH_SECONDS", 1e-9)
     kept = begin(archive)
     with monkeypatch.context() as patch:
-        patch.setattr(tasks, "read", lambda *_: whole.interrupt())
+        patch.setattr(folder, "shard_of_file", lambda *_: whole.interrupt())
         with pytest.raises(KeyboardInterrupt):
             batch.run(plan(), output=archive)
     assert whole.shards(archive) == kept
