@@ -244,13 +244,13 @@ def main(first: int, last: int, try_one: Callable[..., list[str]] = tried) -> No
     at: list[str] = []
     places: dict[str, int] = {}
 
-    def confess(defect: Exception, *_: object) -> None:
+    def confess(defect: Exception, *_: object, **__: object) -> None:
         frames = traceback.extract_tb(defect.__traceback__)
         own = [frame for frame in frames if "/lib/python" not in frame.filename]
         at.append(f"{type(defect).__name__}: {defect} @ " + " < ".join(
             f"{Path(frame.filename).name}:{frame.lineno}" for frame in reversed(own[-4:])))  # fmt: skip
 
-    cli._confess = confess
+    cli.confess = confess
     signal.signal(signal.SIGALRM, _too_long)
     warnings.simplefilter("error")
     folder = Path(tempfile.mkdtemp())
