@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from batch.watching.deck_files import DeckFiles, path_of
+from batch.watching.following import DeckFiles, path_of
 from ic.text.files import LIBRARY
 from ic.text.lexer import COMMAND_LINE
 
