@@ -19,7 +19,6 @@ from met import units
 from met.parameter import Parameter
 from met.plan import BASE, Coordinate, Experiment, Formula, Quantity
 from met.plan import relations as relations
-from met.plan import rest as rest
 from met.plan import structure as plan_structure
 from met.plan.checked_answers import check_linear, check_search
 from met.plan.codec import Damaged
@@ -93,11 +92,11 @@ def check_text(document: Any, where: str = "") -> None:
 
 def _group_name(experiment: Experiment, where: str, before: Collection[str]) -> None:
     """The name of a run or sweep, or the part after it that tells a group of a sweep from the others."""
-    head, _, rest = experiment.name.partition(".")
+    head, _, relations = experiment.name.partition(".")
     plan_structure.check_name(head, where)
     if experiment.name in before:
         raise Damaged(where, f"`{experiment.name}` is there twice")
-    if (rest or experiment.sweep) and not (GROUP.fullmatch(rest) and experiment.sweep == head):
+    if (relations or experiment.sweep) and not (GROUP.fullmatch(relations) and experiment.sweep == head):
         raise Damaged(where, f"{experiment.name!r} is no name of a group of the sweep `{experiment.sweep}`")
 
 
@@ -419,7 +418,7 @@ def _check_bodies(experiment: Experiment, where: str) -> None:
     if structure.free:
         masses = [f"links.{name}.mass" for name in structure.ground]
         tests.append((f"links.{BASE}.mass", masses, _is_some, "the base moves freely and has no mass"))
-    tests += [*rest.tests(experiment), *relations.tests(experiment, related(experiment))]
+    tests += [*relations.rest_tests(experiment), *relations.tests(experiment, related(experiment))]
     varied = []
     for path, paths, holds, message in tests:
         if any(path not in experiment.parameters for path in paths):

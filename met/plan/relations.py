@@ -12,7 +12,7 @@ import numpy as np
 
 from met import models
 from met.parameter import WORLD, Parameter
-from met.plan import COMPONENTS, Base, Experiment, Formula, GuideUse, Structure
+from met.plan import COMPONENTS, Base, Experiment, Formula, GuideUse, ServoUse, Structure
 from met.plan.channel import carries
 from met.plan.codec import Damaged
 
@@ -164,3 +164,34 @@ def guided_components(experiment: Experiment, use: GuideUse) -> tuple[str, tuple
         elif parameter.shape == "word":
             return None
     return None if guide.components is None else (words["link"], guide.components(SimpleNamespace(**words)))
+
+
+Test = tuple[str, list[str], Callable[[np.ndarray], np.ndarray], str]
+"""Path at fault, paths of the numbers to test, the test (values [case, path] -> [case]), and the message where it
+fails."""
+
+
+def rest_tests(experiment: Experiment) -> list[Test]:
+    """One test for each joint that its servo may require at rest."""
+    return [
+        _test(experiment, use)
+        for use in experiment.structure.servos
+        if models.find("servo", use.model, use.place).at_rest is not None
+    ]
+
+
+def _test(experiment: Experiment, use: ServoUse) -> Test:
+    servo, rate = models.find("servo", use.model, use.place), f"initial.{use.joint}.qd"
+    head = f"{use.joint}.servo."
+    numbers = {
+        path.removeprefix(head): path
+        for path, quantity in experiment.parameters.items()
+        if path.startswith(head) and not isinstance(quantity.value, str | tuple)
+    }
+
+    def holds(values: np.ndarray) -> np.ndarray:
+        p = SimpleNamespace(**{name: values[:, i] for i, name in enumerate(numbers, 1)})
+        return np.asarray(np.logical_not(servo.at_rest(p)) | (values[:, 0] == 0.0))
+
+    message = f"a {use.model} joint begins at rest"
+    return rate, [rate, *numbers.values()], holds, message
