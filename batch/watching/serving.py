@@ -3,6 +3,9 @@
 Others use the machine too, and their browsers and programs reach every port of it; and any page in one's own browser
 can send requests there. So requests are refused without the token in the address, with the name of another host (as
 after DNS rebinding), or from another page. Nothing of the disk is served: there are only five names to ask for.
+
+The run is a page of its own in it, with all scripts, and no run at first. Each run to show is passed to it as data,
+replaces the one before, and keeps its viewpoint.
 """
 
 from __future__ import annotations
@@ -15,17 +18,68 @@ import sys
 import threading
 import time
 from contextlib import suppress
+from functools import cache
 from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from pathlib import Path
 from socket import socket
 from socketserver import TCPServer
 from typing import Any
 from urllib.parse import parse_qs
 
+from batch.portable.page import page_text
+from batch.report.html import inlined
+from batch.report.html.markup import Html, el, lines
 from batch.watching.board import Board
 from batch.watching.door import Door
-from batch.watching.frame import FRAME_POLICY, frame, page_of_runs
 from met.diagnostic import Problem, error
+
+_ASSETS = Path(__file__).with_name("assets")
+
+
+BY_CASE = ("points.js", "overview.js", "cells.js", "map.js")
+"""Scripts of the report that draw a sweep's cases as points and maps."""
+
+
+def _asset(name: str) -> str:
+    return (_ASSETS / name).read_text(encoding="utf-8").strip()
+
+
+@cache
+def frame() -> tuple[str, str]:
+    """The whole text, the same for each deck, with its content security policy."""
+    script, style = _asset("frame.js"), "\n".join([inlined.style(), _asset("frame.css")])
+    policy = (
+        f"default-src 'none'; script-src {inlined.digest(script)}; style-src {inlined.digest(style)}; img-src data:; "
+        "connect-src 'self'; frame-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
+    )
+    head = lines(
+        [
+            el("meta", charset="utf-8"),
+            el("meta", name="viewport", content="width=device-width, initial-scale=1"),
+            el("meta", name="color-scheme", content="light dark"),
+            el("link", rel="icon", href="data:,"),
+            el("title", "met view"),
+            Html(f"<style>{style}</style>"),
+        ]
+    )
+    none = el("noscript", el("p", "This page needs scripts, which this reader does not run."))
+    body = lines([none, Html(f"<script>{script}</script>")])
+    text = f'<!DOCTYPE html>\n<html lang="en">\n<head>\n{head}\n</head>\n<body>\n{body}\n</body>\n</html>\n'
+    return text, policy
+
+
+@cache
+def page_of_runs() -> str:
+    """The whole text of the page in the frame, the same for each run; `assets/kept.js` passes it one run after
+    another."""
+    empty = {"kicker": "", "name": "", "lede": ""}
+    return page_text(empty, [_asset("kept.js")], before=BY_CASE, style=_asset("kept.css"))
+
+
+FRAME_POLICY = "default-src 'none'; frame-ancestors 'none'"
+"""The policy of answers that are not pages."""
+
 
 HOST = "127.0.0.1"
 TOKEN_BYTES = 24
