@@ -11,10 +11,9 @@ import numpy as np
 
 from ic.grammar.syntax import Call, Expression, Name, Number, String, WithUnit, Word, place_of
 from ic.meaning.control.courses import course_named, use_course
-from ic.meaning.control.other_joints import with_other_joints
 from ic.meaning.control.schedule import CONTINUOUS, Rate
 from ic.meaning.control.sensors import use_sensor, without_sensors
-from ic.meaning.control.shared_servos import use_shared
+from ic.meaning.control.shared_servos import use_shared, with_other_joints
 from ic.meaning.definitions.merge import Item, MergedBlock, no_block, overlay, refuse_block
 from ic.meaning.expressions.quantity import measure_of
 from ic.meaning.mechanics.arm import ResolvedArm

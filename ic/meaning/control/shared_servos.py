@@ -10,8 +10,9 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
+from ic.grammar.expressions import EVERY_JOINT
 from ic.grammar.syntax import Name
-from ic.meaning.definitions.merge import Item
+from ic.meaning.definitions.merge import Item, MergedBlock, overlay
 from ic.meaning.definitions.resolve import Definition
 from ic.meaning.mechanics.arm import ResolvedArm
 from ic.meaning.parameters.models import word_of
@@ -19,6 +20,7 @@ from ic.meaning.parameters.owner import NotSweepable
 from ic.meaning.parameters.scope import Scope
 from ic.meaning.parameters.shared import SharedEntries
 from ic.text.complaints import Complaints
+from met.diagnostic import leave_out
 from met.frozen import frozen
 from met.plan import Joint
 
@@ -120,3 +122,38 @@ def _is_as_written(scope: Scope, shared: SharedServo, joint: str) -> bool:
     heads = tuple(f"{head}." for head in (joint, *shared.heads))
     changed = any(f"{path}.".startswith(heads) for path in (*scope.varied, *scope.settings))
     return not changed and shared.entries.has_names_as_written(scope)
+
+
+def with_other_joints(body: MergedBlock, arm: ResolvedArm, complaints: Complaints) -> MergedBlock:
+    """The servos, with an entry for each moving joint that follows no other, in the arm's order; `*` stands for those
+    that have none.
+
+    An entry that only changes its servo, `lift { kp = ...; }`, changes that of `*`.
+    """
+    every = body.get(EVERY_JOINT)
+    if every is None:
+        return body
+    others = {key: item for key, item in body.items.items() if item is not every}
+    items, used = {}, False
+    for joint in arm.independent:
+        own = others.pop(joint.name, None)
+        if own is None:
+            items[joint.name] = replace(every, name=joint.name)
+        else:
+            items[joint.name] = own if own.value is not None else _changed(every, own, complaints)
+        used = used or own is None or own.value is None
+    taken_over = len(every.homes) > 1  # from a run that needs it itself
+    if not used and arm.independent and not arm.failed and not taken_over:
+        complaints.remark(
+            "D287",
+            "`*` stands for no joint: each of them has a servo of its own",
+            every.place,
+            help=leave_out("leave it out"),
+        )
+    return replace(body, items={**items, **others})
+
+
+def _changed(every: Item, own: Item, complaints: Complaints) -> Item:
+    """The entry of `*` as changed by one joint's entry."""
+    body = own.body if every.body is None or own.body is None else overlay(every.body, own.body, complaints)
+    return replace(every, name=own.name, body=body, upon=own.place)
