@@ -19,7 +19,7 @@ from batch.campaigns.campaign import Campaign, Wires, prepare
 from batch.campaigns.choosing import read_plan
 from batch.campaigns.output import sidecar_path
 from batch.campaigns.performing import perform
-from batch.queries.bed_margins import in_words
+from batch.queries.stability_words import in_words
 from batch.queries.summary import summarise
 from batch.terminal.progress import Bar
 from batch.terminal.running import first_picture

@@ -16,8 +16,8 @@ from batch.beds.bed_size import BedSize, bed_size, joint_of
 from batch.beds.chosen_bed import on_beds
 from batch.beds.sizing import UNITS, Extreme, MotorFigures, PartCheck, PartVerdict
 from batch.campaigns.choosing import experiments_named, read_plan
-from batch.queries.bed_margins import in_words
 from batch.queries.pool import groups_named
+from batch.queries.stability_words import in_words
 from batch.terminal.progress import Bar
 from hw.motor_parts import parts_list
 from ic.printing.columns import columns, count

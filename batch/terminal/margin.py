@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import asdict
 from typing import Any
 
-from batch.queries.bed_margins import stable_at, stable_head, verdict
+from batch.queries.stability_words import stable_at, stable_head, verdict
 from hw.driving.pace import pace
 from ic.printing.columns import columns, count
 from met.analysis.margin import HEAVIEST, Margin, remedy

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from batch.queries.bed_margins import in_words, verdict
+from batch.queries.stability_words import in_words, verdict
 from batch.terminal.margin import as_data, margin_lines
 from met.analysis.margin import HEAVIEST, LIGHTEST, Margin, margins, remedy
 from met.cli import main

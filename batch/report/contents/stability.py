@@ -7,8 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from batch.queries.bed_margins import stable_at, verdict
 from batch.queries.pool import CaseColumn, Pool, ranges
+from batch.queries.stability_words import stable_at, verdict
 from batch.report.contents.parts import BedStability, Stability
 from met.analysis.margin import Margin, margins
 from met.distinct import distinct

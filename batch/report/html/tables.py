@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from batch.queries.bed_margins import stable_head
+from batch.queries.stability_words import stable_head
 from batch.report.contents.parts import (
     EvidencePart,
     InfluencePart,
