@@ -12,7 +12,7 @@ from met.host.streams import kept
 from met.messages.visible import say
 
 
-@click.command("import", short_help="Make a deck from a robot's URDF file.")
+@click.command("import", short_help="Make a deck from a robot's URDF or MJCF file.")
 @click.argument("file")
 @click.option("-o", "output", metavar="DECK", help="Write the deck to this file, instead of printing it.")
 @click.option("--force", is_flag=True, help="Overwrite an existing file.")
@@ -25,10 +25,11 @@ from met.messages.visible import say
 )
 @loudness_options
 def import_(file: str, output: str | None, force: bool, mimic: str, quiet: bool, verbose: bool) -> None:
-    """Make a deck from a URDF file: the arm with its limits, friction as comments, and runs to begin with.
+    """Make a deck from a URDF file, or a model in MuJoCo's MJCF: the arm with its limits, friction as comments, and
+    runs to begin with.
 
-    `met import panda.urdf -o panda.ic`, then `met run panda.ic`. A deck can also take the file as it is:
-    `arm panda from urdf("panda.urdf") { ... }`.
+    `met import panda.urdf -o panda.ic`, then `met run panda.ic`. A deck can also take a URDF file as it is:
+    `arm panda from urdf("panda.urdf") { ... }`. For MJCF, MuJoCo is needed: `pip install 'met-arm[mjcf]'`.
     """
     from ic.beginnings.files import put
     from ic.driver.import_robot import import_with_remarks

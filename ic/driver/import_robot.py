@@ -1,4 +1,6 @@
-"""`met import`: a URDF file to the text of a deck. A robot that no arm can be made of is refused, with every reason."""
+"""`met import`: a URDF or MJCF file to the text of a deck. A robot that no arm can be made of is refused, with
+every reason.
+"""
 
 from __future__ import annotations
 
@@ -12,9 +14,11 @@ from ic.meaning.parameters.scope import Scope
 from ic.read import in_order
 from ic.robots.deck import arm_name, print_deck, remarks
 from ic.robots.entries import ArmEntries, arm_entries
-from ic.robots.files import KIND, load
+from ic.robots.files import load
 from ic.robots.following import Treatment, without_mimics
+from ic.robots.mjcf import read as read_mjcf
 from ic.robots.robot import Link
+from ic.robots.xml import MJCF, parse
 from ic.text.complaints import Complaints
 from ic.text.files import Files, FoundFile
 from ic.text.limits import MOST_URDF_BYTES
@@ -32,8 +36,7 @@ def import_with_remarks(path: str, mimic: Treatment = "follow", beside: str | No
     file's text."""
     files = Files()
     try:
-        file = FoundFile(path, os.path.normpath(path))
-        arm = load(file.name, files.text(file, kind=KIND, most=MOST_URDF_BYTES))
+        arm = _load(FoundFile(path, os.path.normpath(path)), files)
         if mimic != "follow":
             arm = arm_entries(without_mimics(arm.robot, mimic))
         arm = _checked(arm)
@@ -43,10 +46,11 @@ def import_with_remarks(path: str, mimic: Treatment = "follow", beside: str | No
         raise Problem(
             in_order(problem.diagnostics, sources), {source.name: source.text for source in sources}
         ) from None
-    (source,) = files.read_so_far.values()
+    source, *included = files.read_so_far.values()
     option = f" --mimic {mimic}" if mimic != "follow" else ""
     name = os.path.basename(path)
     title = f"made by `met import {name}{option}` from a file with the SHA-256 {source.sha256[:16]}..."
+    title += f", which includes {len(included)} more" if included else ""
     lines = print_deck(arm, title)
     return "\n".join(lines) + "\n", list(remarks(arm))
 
@@ -65,6 +69,13 @@ def _meshes_from(folder: str, arm: ArmEntries) -> ArmEntries:
     links = tuple(map(moved, robot.links))
     other = arm_entries(replace(robot, links=links, root=links[robot.links.index(robot.root)]))
     return replace(other, base=None, no_body=arm.no_body) if arm.base is None else other
+
+
+def _load(file: FoundFile, files: Files) -> ArmEntries:
+    """The robot of a file, in either format. Raises Problem."""
+    text = files.text(file, kind="file of a robot", most=MOST_URDF_BYTES)
+    root = parse(file.name, text)
+    return arm_entries(read_mjcf(root, file.name, files)) if root.tag in MJCF else load(file.name, text)
 
 
 def _checked(arm: ArmEntries) -> ArmEntries:
@@ -89,14 +100,15 @@ def _check(arm: ArmEntries) -> None:
     complaints = Complaints()
     entries = (*([arm.base.entry] if arm.base is not None else []), *arm.entries)
     definitions = Definitions(Deck(arm.robot.file, (Group(words, None, None, entries, place),), ()), complaints)
-    definitions.robot_files.take(arm)
+    if arm.robot.format == "URDF":  # which a deck may name
+        definitions.robot_files.take(arm)
     for definition in definitions.of_kind("arm").values():
         check_arm(Scope(definitions, complaints), definition)
     if complaints.errors:
-        raise Problem(_mended(complaints.errors))
+        raise Problem(_mended(complaints.errors, arm.robot.format))
 
 
-def _mended(diagnostics: tuple[Diagnostic, ...]) -> list[Diagnostic]:
+def _mended(diagnostics: tuple[Diagnostic, ...], format: str) -> list[Diagnostic]:
     """The errors with the remedies of `met import` in place of those for a deck."""
     follow = (
         "`--mimic free` lets such joints move by themselves, `--mimic fixed` holds them where they are at the start"
@@ -104,7 +116,7 @@ def _mended(diagnostics: tuple[Diagnostic, ...]) -> list[Diagnostic]:
     mended = [
         replace(diagnostic, help=(follow,)) if diagnostic.code == "D213" else diagnostic for diagnostic in diagnostics
     ]
-    if mended[-1].code != "D213":
+    if mended[-1].code != "D213" and format == "URDF":
         other = 'write a deck with `arm NAME from urdf("FILE") { ... }`: its block can change what the file says'
         mended[-1] = replace(mended[-1], help=(*mended[-1].help, other))
     return mended

@@ -7,7 +7,7 @@ for number. The first run holds the arm; where the file has damping or friction,
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 
 from ic.grammar.spell import spell
 from ic.grammar.syntax import Call, Expression, List, Setting, String
@@ -15,13 +15,15 @@ from ic.robots.attributes import printable
 from ic.robots.doubts import in_other_units, incomplete
 from ic.robots.entries import LIMITS, ArmEntries, RobotEntry, spelled
 from ic.robots.following import hold_position
+from ic.robots.mjcf_ways import ways_on
 from ic.robots.names import word
-from ic.robots.robot import MOVING, Inertial, Joint, Mimic
+from ic.robots.robot import MOVING, Inertial, Joint, Mimic, Robot
 from ic.robots.warnings import unseen_words
 from ic.text.edition import EDITION_WORD, LATEST
 
 WIDE = 100  # columns of a block on one line
 WIDEST = 120  # with its comment
+FAST = "10 kHz"  # for actuators, which decay with up to 3400 1/s in published models
 
 
 def print_deck(body: ArmEntries, title: str) -> Iterator[str]:
@@ -52,7 +54,8 @@ def _about(body: ArmEntries) -> Iterator[str]:
     weight = " Its mass counts in a run with `base = free;`." if weighs else ""
     if not weighs and body.robot.root.inertial is not None:
         weight = " Its inertia is left out: no body has it."
-    yield f"// `base` is the file's link `{_safe(body.robot.root.name.text)}`.{weight}"
+    what = "body" if body.robot.format == "MJCF" else "link"
+    yield f"// `base` is the file's {what} `{_safe(body.robot.root.name.text)}`.{weight}"
     if body.robot.dropped:
         yield f"// Not in this deck: {_counted(body.robot.dropped)}."
 
@@ -68,6 +71,7 @@ def remarks(body: ArmEntries) -> Iterator[str]:
     if attributes:
         yield f"attributes not read, and not in the deck: {_counted(attributes)}"
     yield from (f"{unseen_words(len(elements))} {reason}" for reason, elements in body.robot.unseen.items())
+    yield from ways_on(body.robot)
     yield from (remark.text for remark in in_other_units(body.robot))
     yield from incomplete(body.robot)
     if body.no_body:
@@ -178,44 +182,85 @@ def _runs(body: ArmEntries, arm: str) -> Iterator[str]:
     yield ""
     yield "default run hold {"
     yield f"    arm         = {arm};"
+    yield from ["    base        = free;"] if body.robot.base_pose is not None else []
     yield "    servos      {"
     driven = [name for name, joint in joints.items() if joint.mimic is None]
     for name in driven:
         servo, position = slide if name in slides else held, _position_text(poses[name], name in slides)
         own = f" {{ command = position({position}); }}" if poses[name] else ""
-        yield f"        {name} = {servo}{own};" + ("  // the middle of its range, which 0 is not in" if own else "")
+        middle = bool(own) and joints[name].start is None
+        yield f"        {name} = {servo}{own};" + ("  // the middle of its range, which 0 is not in" if middle else "")
     yield "    }"
     moved = [f"{name}.q = {_position_text(poses[name], name in slides)};" for name in driven if poses[name]]
-    yield from (["    initial {", *(f"        {entry}" for entry in moved), "    }"] if moved else [])
-    yield "    environment { gravity = [0, 0, -9.81] m/s^2; }"
+    if body.robot.base_pose is not None:
+        pose = zip(("position", "rpy"), body.robot.base_pose, ("m", "rad"), strict=True)
+        moved += [f"base.{key} = {_list(values)} {unit};" for key, values, unit in pose if any(values)]
+    start = f"  // {_safe(body.robot.keyframe)}" if body.robot.keyframe else ""
+    yield from ([f"    initial {{{start}", *(f"        {entry}" for entry in moved), "    }"] if moved else [])
+    yield f"    environment {{ gravity = {_list(body.robot.gravity)} m/s^2; }}"
     yield "    rates       { dynamics = 1 kHz;  servos = 1 kHz;  record = 100 Hz; }"
     yield "    duration    = 1 s;"
     yield "    record      = [q, tau];"
     yield "}"
-    rubbing = {name: joint for name, joint in joints.items() if joint.friction_at is not None}
-    if rubbing:
-        yield from _fall(joints, rubbing, slides, lambda name: _free(name, taken))
+    for run, comment, servos, laws in _passive_runs(body.robot, joints, taken):
+        yield from _passive_run(run, comment, servos, laws, slides)
 
 
-def _fall(
-    joints: Mapping[str, Joint], rubbing: Mapping[str, Joint], slides: Collection[str], free: Callable[[str], str]
+Laws = Mapping[str, Mapping[str, float]]
+"""Values of the keys of `passive`, by joint."""
+
+
+def _passive_runs(
+    robot: Robot, joints: Mapping[str, Joint], taken: Collection[str]
+) -> Iterator[tuple[str, str, Mapping[str, str], Laws]]:
+    """Runs on the servo `passive` that the file has numbers for: name, comment, servos by joint, and their keys."""
+
+    def servos(ending: str) -> dict[str, str]:
+        return {name: _free(f"{name}_{ending}", taken) for name in joints}
+
+    laws = {name: joint.friction for name, joint in joints.items()}
+    if any(joint.friction_at is not None for joint in joints.values()):
+        more = {"springs": "stiffness", "rotors": "rotor"}
+        listed = [what for what, key in more.items() if any(law.get(key) for law in laws.values())]
+        *first, last = ["damping", "friction", *listed]
+        yield "fall", f"The joints let go, with the {', '.join(first)} and {last} of the file.", servos("bearing"), laws
+    if any(joint.drive for joint in joints.values()):
+        controls = f"at the controls of {_safe(robot.keyframe)}" if robot.keyframe else "at the controls 0"
+        comment = f"Actuators as springs and dampers, {controls}, with all of `fall`. No force is limited."
+        both = {name: joint.drive or joint.friction for name, joint in joints.items()}
+        yield "drive", comment, servos("actuator"), both
+
+
+def _passive_run(
+    run: str, comment: str, servos: Mapping[str, str], laws: Laws, slides: Collection[str]
 ) -> Iterator[str]:
-    """The lines of a run in which the joints let go, with the file's damping and friction."""
+    """The lines of a run like `hold` with the servo `passive` on each joint."""
     yield ""
-    yield "// The joints let go, with the damping and friction of the file."
-    for name in joints:
-        damping, friction = ("N*s/m", "N") if name in slides else ("N*m*s/rad", "N*m")
-        coefficients = rubbing[name].friction if name in rubbing else {}
-        units = {"damping": damping, "friction": friction}
-        keys = "".join(f"  {key} = {spelled(value)} {units[key]};" for key, value in coefficients.items() if value)
-        yield f"servo {free(f'{name}_bearing')} {{ model = passive;{keys} }}"
+    yield f"// {comment}"
+    for name, law in laws.items():
+        way, inertia = ("m", "kg") if name in slides else ("rad", "kg*m^2")
+        effort = "N" if name in slides else "N*m"
+        units = {
+            "damping": f"{effort}*s/{way}",
+            "friction": effort,
+            "stiffness": f"{effort}/{way}",
+            "rest": way,
+            "rotor": inertia,
+        }
+        keys = "".join(f"  {key} = {spelled(value)} {units[key]};" for key, value in law.items() if value)
+        yield f"servo {servos[name]} {{ model = passive;{keys} }}"
     yield ""
-    yield "run fall like hold {"
+    yield f"run {run} like hold {{"
+    yield from [f"    rates {{ dynamics = {FAST}; }}"] if run == "drive" else []
     yield "    servos {"
-    for name in joints:
-        yield f"        {name} = {free(f'{name}_bearing')};"
+    for name in laws:
+        yield f"        {name} = {servos[name]};"
     yield "    }"
     yield "}"
+
+
+def _list(values: Sequence[float]) -> str:
+    return f"[{', '.join(map(spelled, values))}]"
 
 
 def _position_text(value: float, slides: bool) -> str:

@@ -66,7 +66,7 @@ def incomplete(robot: Robot) -> Iterator[str]:
         if link.inertial is not None:
             moments = link.inertial.moments
             missing = [
-                f"`{moment}`" for moment, place in zip(MOMENTS, moments.places, strict=True) if place == moments.place
+                f"`{moment}`" for moment, place in zip(MOMENTS, moments.places, strict=False) if place == moments.place
             ]
             if missing:
                 yield f"the inertia of link `{printable(link.name.text)}` has no {', '.join(missing)}: taken as 0"

@@ -10,7 +10,7 @@ the moments are written in the link's axes. What is zero by itself is left out.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 
 from ic.grammar.syntax import (
     Call,
@@ -178,6 +178,16 @@ def rotation(roll: float, pitch: float, yaw: float) -> tuple[tuple[float, float,
         (sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr),
         (-sp, cp * sr, cp * cr),
     )
+
+
+def rpy_of(R: Sequence[Sequence[float]]) -> tuple[float, float, float]:
+    """Turns about fixed x, y, z that make a rotation; where the pitch is a right angle, without a yaw where rounding
+    leaves none."""
+    across = math.hypot(R[0][0], R[1][0])
+    yaw = math.atan2(R[1][0], R[0][0]) if across > NOISE else 0.0
+    c, s = _turn(yaw)
+    roll = math.atan2(s * R[0][2] - c * R[1][2], c * R[1][1] - s * R[0][1])
+    return roll + 0.0, math.atan2(-R[2][0], across) + 0.0, yaw + 0.0  # -0 is 0
 
 
 def _turn(angle: float) -> tuple[float, float]:

@@ -10,11 +10,10 @@ import math
 from dataclasses import replace
 from typing import Literal
 
-from ic.robots.entries import limits, rotation, spelled
+from ic.robots.entries import limits, rotation, rpy_of, spelled
 from ic.robots.robot import MOVING, Joint, Numbers, Robot
 
 Treatment = Literal["follow", "free", "fixed"]
-PARALLEL = 1e-9  # sine of the angle to a right one below which a pitch leaves roll and yaw alike
 
 
 def without_mimics(robot: Robot, treatment: Treatment) -> Robot:
@@ -54,9 +53,12 @@ def _beyond(joint: Joint, value: float) -> str:
 
 
 def hold_position(joint: Joint) -> float:
-    """The position at which a deck's first run holds a joint: 0, or the middle of its range where that excludes 0."""
+    """The position at which a deck's first run holds a joint: the file's, else 0, or the middle of its range where that
+    excludes 0."""
     if joint.type.text not in MOVING:
         return 0.0
+    if joint.start is not None:
+        return joint.start
     ends = {name: limit.values[0] for name, limit in limits(joint).items()}
     lower, upper = ends.get("lower", -math.inf), ends.get("upper", math.inf)
     if lower <= 0.0 <= upper or not lower < upper < math.inf:  # else the arm is refused
@@ -105,8 +107,4 @@ def _turned(rpy: tuple[float, ...], axis: tuple[float, float, float], angle: flo
     )
     before = rotation(rpy[0], rpy[1], rpy[2])
     R = [[sum(before[i][k] * turn[k][j] for k in range(3)) for j in range(3)] for i in range(3)]
-    across = math.hypot(R[0][0], R[1][0])
-    pitch = math.atan2(-R[2][0], across)
-    if across < PARALLEL:
-        return math.atan2(-R[1][2], R[1][1]), pitch, 0.0
-    return math.atan2(R[2][1], R[2][2]), pitch, math.atan2(R[1][0], R[0][0])
+    return rpy_of(R)

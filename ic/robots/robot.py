@@ -1,4 +1,4 @@
-"""A robot as in its URDF file: links, joints, and the file's other data, each with its place.
+"""A robot as in its URDF or MJCF file: links, joints, and the file's other data, each with its place.
 
 Names, numbers and frames are the file's own: SI, turns `rpy` about fixed x, y, z in that order, as in a deck. `None`
 stands for what the file leaves out.
@@ -94,10 +94,13 @@ class Joint:
 
     limits    lower, upper, effort, velocity: those that are written, infinite where none is meant; `limits_at` the
               place of their element
-    friction  damping and friction, not negative; `friction_at` their place, None where both are zero or not written
+    friction  what acts on it without a motor, by the keys of `passive`: damping, friction, and of a model in MJCF
+              stiffness, rest and rotor; `friction_at` their place, None where all are zero or not written
     mimic     the joint that it follows
     followed  the same of a joint that follows none any more; `held` its position where it is fixed instead, `beyond`
               the limits that this is not within, in words
+    drive     the same as `friction` together with its actuators, at the controls of the keyframe; empty without one
+    start     its position at the start, None where the file has none
     """
 
     name: Written
@@ -115,15 +118,21 @@ class Joint:
     followed: Mimic | None = None
     held: float = 0.0
     beyond: str = ""
+    drive: Mapping[str, float] = field(default_factory=dict)
+    start: float | None = None
 
 
 @frozen
 class Robot:
     """A robot.
 
-    root     the link that no joint carries, which is the arm's base
-    dropped  elements that were not read, by tag, or of which an attribute was not, by `NAME of TAG`
-    unseen   elements that name meshes which are not drawn, by reason
+    root       the link that no joint carries, which is the arm's base
+    dropped    elements that were not read, by tag, or of which an attribute was not, by `NAME of TAG`
+    unseen     elements that name meshes which are not drawn, by reason
+    gravity    m/s^2, in the axes of the base where that is fixed
+    base_pose  position, m, and `rpy`, rad, of a base that floats; None of one that is fixed
+    keyframe   where the positions at the start are from, in words
+    format     of the file: URDF or MJCF
     """
 
     file: str
@@ -133,6 +142,10 @@ class Robot:
     root: Link
     dropped: Mapping[str, tuple[Element, ...]]
     unseen: Mapping[str, tuple[Element, ...]] = field(default_factory=dict)
+    gravity: tuple[float, float, float] = (0.0, 0.0, -9.81)
+    base_pose: tuple[tuple[float, ...], tuple[float, ...]] | None = None
+    keyframe: str = ""
+    format: str = "URDF"
 
     @property
     def carried(self) -> tuple[Link, ...]:

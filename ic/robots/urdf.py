@@ -13,7 +13,7 @@ from dataclasses import replace
 from ic.robots.attributes import XACRO, Found, printable, read_element
 from ic.robots.robot import Inertial, Joint, Link, Mimic, Numbers, Robot
 from ic.robots.visuals import link_visuals
-from ic.robots.xml import Element, parse
+from ic.robots.xml import MJCF, Element, parse
 from ic.text.complaints import Complaints, known_words
 from ic.text.limits import MOST_LINKS
 from met.diagnostic import Label, Place, Problem, did_you_mean, error
@@ -21,6 +21,7 @@ from met.diagnostic import Label, Place, Problem, did_you_mean, error
 MOMENTS = ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
 MOST_NAMED = 6  # places of a fault in one message
 
+AS_DECK = "`met import FILE -o DECK.ic` makes a deck of an MJCF file"
 _FORMATS = {"sdf": "SDF", "mujoco": "MuJoCo's MJCF", "svg": "a drawing", "html": "a web page", "COLLADA": "a mesh"}
 
 
@@ -38,7 +39,7 @@ def read(name: str, text: str) -> Robot:
                 "D203",
                 f"`<{printable(root.tag)}>` is not URDF{what}",
                 root.place,
-                help='a URDF file is `<robot name="..."> ... </robot>`',
+                help=AS_DECK if root.tag in MJCF else 'a URDF file is `<robot name="..."> ... </robot>`',
             )
         )
     for n, element in enumerate(root.all("link")):
@@ -77,7 +78,8 @@ def read(name: str, text: str) -> Robot:
         tuple(links),
         tuple(joints),
         _root(root, links, joints),
-        *({what: tuple(elements) for what, elements in counted.items()} for counted in (dropped, unseen)),
+        {what: tuple(elements) for what, elements in dropped.items()},
+        {what: tuple(elements) for what, elements in unseen.items()},
     )
 
 

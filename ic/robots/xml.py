@@ -1,7 +1,7 @@
 """XML as a tree of elements that know their places: by the standard library's expat, within limits.
 
 A document type and entities of the file's own are refused, so a hostile file cannot expand beyond its length. Text
-between elements is left alone, as URDF has none.
+between elements is left alone, as neither URDF nor MJCF has any.
 """
 
 from __future__ import annotations
@@ -12,14 +12,16 @@ from collections.abc import Iterator
 from functools import cached_property
 from xml.parsers import expat
 
-from ic.text.limits import MOST_ELEMENTS, XML_DEPTH
+from ic.text.limits import MJCF_DEPTH, MOST_ELEMENTS, XML_DEPTH
 from met.diagnostic import Diagnostic, Label, Place, Problem, error
 
+MJCF = ("mujoco", "mujocoinclude")
+"""The outermost elements of MJCF files."""
 SHOWN = 60  # characters of a name or a value in a message
 
 _ATTRIBUTE = re.compile(rb"""([^\s=<>/"']+)\s*=\s*(?:"[^"]*"|'[^']*')""")
-_NO_URDF = "a URDF file is XML, `<robot> ... </robot>`: is this the right file?"
-_REMEDY = "URDF needs neither: write the values out"
+_NO_ROBOT = "a URDF file is XML, `<robot> ... </robot>`, and MJCF `<mujoco> ... </mujoco>`: is this the right file?"
+_REMEDY = "a robot's file needs neither: write the values out"
 
 
 class XmlSource:
@@ -99,17 +101,15 @@ def parse(name: str, text: str) -> Element:
             raise Problem(
                 error(
                     "D202",
-                    f"a URDF file has at most {MOST_ELEMENTS} elements",
+                    f"a robot's file has at most {MOST_ELEMENTS} elements",
                     place_here(),
                     help="a robot has some hundred: is this the right file?",
                 )
             )
-        if len(open_) >= XML_DEPTH:
-            raise Problem(
-                error(
-                    "D202", f"elements go deeper than {XML_DEPTH}", place_here(), help="those of URDF go some six deep"
-                )
-            )
+        most = MJCF_DEPTH if root and root[0].tag in MJCF else XML_DEPTH
+        if len(open_) >= most:
+            usual = "a robot has some ten bodies in a row" if most == MJCF_DEPTH else "those of URDF go some six deep"
+            raise Problem(error("D202", f"elements go deeper than {most}", place_here(), help=usual))
         element = Element(tag, attributes, source, parser.CurrentByteIndex)
         (open_[-1].children if open_ else root).append(element)
         open_.append(element)
@@ -164,7 +164,7 @@ def _not_xml(source: XmlSource, offset: int, code: int, open_: list[Element]) ->
         f"`{source.name}` is no XML: {why}",
         place,
         also=[Label(open_[-1].place, "opened here")] if left_open else [],
-        help=helps.get(why, _NO_URDF),
+        help=helps.get(why, _NO_ROBOT),
     )
 
 
@@ -178,4 +178,4 @@ def _of_token(data: bytes, offset: int) -> str:
         return 'in a value `<` is written `&lt;`; else a `"` or a `>` is missing before it'
     if data.rfind(b"<", 0, offset) > data.rfind(b">", 0, offset):
         return 'within a tag stands `NAME="..."`, in quotes, with a blank before it'
-    return _NO_URDF
+    return _NO_ROBOT

@@ -310,8 +310,10 @@ def _xml(text: str, name: str) -> Diagnostic:
         f"`met import {name} -o robot.ic` makes a deck of a robot's URDF file",
         f'a deck can take such a file as it is: `arm NAME from urdf("{file}") {{ ... }}`',
     ]
-    if "<robot" not in text:
-        helps = ["a deck is text in a language of its own; of robots in XML, MET reads URDF files (`met import`)"]
+    if "<mujoco" in text:
+        helps = [f"`met import {name} -o robot.ic` makes a deck of a model in MuJoCo's MJCF"]
+    elif "<robot" not in text:
+        helps = ["a deck is text in a language of its own; of robots in XML, `met import` reads URDF and MJCF"]
     return error("D002", f"`{name}` is XML, not a deck", place, help=helps)
 
 

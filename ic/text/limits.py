@@ -15,11 +15,12 @@ from met.diagnostic import Diagnostic
 
 MOST_BYTES = 2 << 20  # of one file
 MOST_TOKENS = 500_000  # of all files together, white space included
-MOST_URDF_BYTES = 8 << 20  # of one URDF file
-MOST_MESH_BYTES = 64 << 20  # of one mesh
+MOST_URDF_BYTES = 8 << 20  # of one URDF or MJCF file
+MOST_MESH_BYTES = 64 << 20  # of one mesh, and of all that the bodies of one MJCF file have their mass from
 MOST_ELEMENTS = 50_000  # of one XML file
 MOST_LINKS = 1_000  # of one robot
 XML_DEPTH = 40  # of elements within each other
+MJCF_DEPTH = 200  # the same where bodies are within each other, as in MJCF
 LONGEST_LINE = 200_000  # characters
 MOST_INCLUDES = 2_000  # files entered, again and again counted
 INCLUDE_DEPTH = 50

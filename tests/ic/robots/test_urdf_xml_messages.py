@@ -63,7 +63,7 @@ error[D201]: a document type and entities are not read
   |
 2 | <!DOCTYPE robot [ <!ENTITY lol "lol"> ]>
   | ^^^^^^^^^
-  = help: URDF needs neither: write the values out
+  = help: a robot's file needs neither: write the values out
 """,
     ),
     mistake(
@@ -137,7 +137,7 @@ error[D200]: `two.urdf` is no XML: syntax error
   |
 1 | hello
   | ^
-  = help: a URDF file is XML, `<robot> ... </robot>`: is this the right file?
+  = help: a URDF file is XML, `<robot> ... </robot>`, and MJCF `<mujoco> ... </mujoco>`: is this the right file?
 """,
     ),
     no_robot(

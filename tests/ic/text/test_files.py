@@ -280,7 +280,7 @@ error[D002]: `two.sdf` is XML, not a deck
   |
 1 | <?xml version='1.0'?>
   | ^
-  = help: a deck is text in a language of its own; of robots in XML, MET reads URDF files (`met import`)
+  = help: a deck is text in a language of its own; of robots in XML, `met import` reads URDF and MJCF
   = note: included from a.ic:2
 
 2 errors
