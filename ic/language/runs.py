@@ -9,7 +9,7 @@ from met.integrators import DEFAULT_INTEGRATOR, INTEGRATORS
 from met.metrics import METRICS
 from met.models import Model
 from met.parameter import Parameter
-from met.plan import BALANCED, VELOCITY_PRODUCTS
+from met.plan.run_keys import BALANCED, VELOCITY_PRODUCTS
 from met.plan.searches import LEAST_MARGIN
 from met.substitution import bed_scale
 

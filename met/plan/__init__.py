@@ -50,7 +50,6 @@ import numpy as np
 from met.diagnostic import Place
 from met.frozen import frozen, keyed
 from met.parameter import BASE as BASE
-from met.parameter import Parameter
 from met.plan.chains import ground, springs, straightened
 from met.plan.closing import Loop
 from met.plan.columns import CaseValues, FormulaColumn, ShiftedColumn, all_rows, listed
@@ -62,7 +61,8 @@ from met.plan.judged import (
     StepErrorLimit,
     Tolerance,
 )
-from met.plan.run_keys import RunKey, run_key
+from met.plan.mesh import Mesh as Mesh
+from met.plan.run_keys import BALANCED, VELOCITY_PRODUCTS, run_key
 from met.plan.searches import Search
 from met.trace.graph import Formulas
 
@@ -106,21 +106,6 @@ class Quantity:
     value: float | tuple[float, ...] | str | Formula
     unit: str
     origin: Origin
-
-
-@frozen
-class Mesh:
-    """A file with a link's surface: it is looked at, and never simulated.
-
-    file, sha256     its name, as the deck's files are named, and the digest of its contents; "" where there was none
-    at, rpy, scale   its frame in the link's, m and rad, and the factors along its axes, by which its numbers are metres
-    """
-
-    file: str
-    sha256: str = ""
-    at: tuple[float, ...] = (0.0, 0.0, 0.0)
-    rpy: tuple[float, ...] = (0.0, 0.0, 0.0)
-    scale: tuple[float, ...] = (1.0, 1.0, 1.0)
 
 
 @frozen
@@ -379,32 +364,6 @@ class Recorded:
     def shape(self) -> tuple[int, ...]:
         """The shape of the variable at one instant: (joints, components), each where there are some."""
         return tuple(len(names) for names in (self.joints, self.components) if names)
-
-
-VELOCITY_PRODUCTS = RunKey(
-    path="environment.velocity_products",
-    parameter=Parameter(
-        name="velocity_products",
-        shape="word",
-        words=("on", "off"),
-        default="on",
-        doc="whether Coriolis, centrifugal and gyroscopic torques act",
-    ),
-    true="on",
-    listed=False,
-)
-BALANCED = RunKey(
-    path="initial.servos",
-    parameter=Parameter(
-        name="servos",
-        shape="word",
-        words=("unloaded", "balanced"),
-        default="unloaded",
-        doc="`balanced`: servos begin in equilibrium, so that their joints do not accelerate; `unloaded`: with zero "
-        "current, zero integral and an unloaded gear",
-    ),
-    true="balanced",
-)
 
 
 @frozen

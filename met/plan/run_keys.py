@@ -56,3 +56,29 @@ def run_keys(cls: type) -> Iterator[tuple[str, RunKey]]:
     for field in dataclasses.fields(cls):
         if RUN_KEY in field.metadata:
             yield field.name, field.metadata[RUN_KEY]
+
+
+VELOCITY_PRODUCTS = RunKey(
+    path="environment.velocity_products",
+    parameter=Parameter(
+        name="velocity_products",
+        shape="word",
+        words=("on", "off"),
+        default="on",
+        doc="whether Coriolis, centrifugal and gyroscopic torques act",
+    ),
+    true="on",
+    listed=False,
+)
+BALANCED = RunKey(
+    path="initial.servos",
+    parameter=Parameter(
+        name="servos",
+        shape="word",
+        words=("unloaded", "balanced"),
+        default="unloaded",
+        doc="`balanced`: servos begin in equilibrium, so that their joints do not accelerate; `unloaded`: with zero "
+        "current, zero integral and an unloaded gear",
+    ),
+    true="balanced",
+)
