@@ -137,6 +137,8 @@ class _File(TomlFile):
         return PartsList(motors, benches, self._others())
 
     def _others(self) -> dict[str, BenchPart]:
+        """The parts of a bench besides motors, by name. Raises Problem for one without name, kind or source, or named
+        twice."""
         parts: dict[str, BenchPart] = {}
         for number, table in enumerate(self._several("part")):
             self._only(_PART, "part", number, table)
@@ -152,6 +154,7 @@ class _File(TomlFile):
         return parts
 
     def _several(self, kind: str) -> list[dict[str, Any]]:
+        """The tables of a kind, `[[kind]]`. Raises Problem E441 where it is no list, or too long."""
         tables = self.tables.get(kind, [])
         if not isinstance(tables, list) or not all(isinstance(table, dict) for table in tables):
             raise self.wrong(f"`{kind}` is no list of tables", f"write `[[{kind}]]` above each", key=kind)
@@ -160,6 +163,7 @@ class _File(TomlFile):
         return tables
 
     def _motor(self, number: int, table: dict[str, Any]) -> MotorPart:
+        """The motor of a table. Raises Problem E441 where it has no name or source."""
         self._only((*_WORDS, *FIGURES), "motor", number, table)
         words = {key: self._text("motor", number, table, key) for key in _WORDS if key in table}
         for key, why in (("name", "`--drive` and `--load` call it so"), ("source", "say where its figures are from")):
@@ -169,12 +173,14 @@ class _File(TomlFile):
         return MotorPart(**words, figures=figures, file=self.name)
 
     def _only(self, known: tuple[str, ...], kind: str, number: int, table: dict[str, Any]) -> None:
+        """Raise Problem E441 for a key that this kind of table does not have."""
         for key in table:
             if key not in known:
                 helps = (*did_you_mean(key, known), f"a {kind} has {', '.join(known)}")
                 raise self.wrong(f"a {kind} has no `{key}`", helps, kind, key, number)
 
     def _text(self, kind: str, number: int, table: dict[str, Any], key: str) -> str:
+        """The text of a key of the motors' file. Raises Problem E441 where it is none in a line."""
         text = table.get(key)
         if not isinstance(text, str) or not text.isprintable():
             message = f"`{key}` of {kind} number {number + 1} is no text in a line"

@@ -109,6 +109,8 @@ def _checked(file: str, include_dirs: tuple[str, ...], defines: tuple[str, ...],
 
 
 def _print_verdict(checked: _Checked, verbose: bool) -> None:
+    """Print the verdict on a checked deck or plan: errors, warnings and sizes, and with `verbose` also notes and
+    allowed warnings."""
     from ic.printing.check import left_out, notes, verdict
 
     assert checked.plan is not None
@@ -387,12 +389,15 @@ def _compiled(
 def _source(
     deck: str, include_dirs: tuple[str, ...], defines: tuple[str, ...], settings: tuple[str, ...], select: Any
 ) -> tuple[Plan, Compiled]:
+    """A deck's plan, and the compiled deck that it is from. Raises Problem."""
     compiled = _compiled(deck, include_dirs, defines, settings, select)
     assert compiled.plan is not None
     return compiled.plan, compiled
 
 
 def _plan_in_file(path: str, names: tuple[str, ...]) -> Plan:
+    """The plan of a plan file, with only the runs and sweeps of these names. Raises Problem D174 for a name that is not
+    in it."""
     from dataclasses import replace
 
     from ic.text.complaints import known_words

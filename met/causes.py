@@ -154,7 +154,7 @@ def _of_guide(experiment: Experiment, joint: str) -> str:
 
 
 def _cause_of_payload(experiment: Experiment, number: int, tick: float) -> str:
-    """The cause of a failure by one of the payloads that fly, in words."""
+    """The cause of a failure by one of the payloads in free flight, in words."""
     payload = [flying for flying in experiment.structure.payloads if flying.flies][number]
     where = f" ({payload.place.file}:{payload.place.line})" if payload.place else ""
     return (

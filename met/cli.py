@@ -66,6 +66,8 @@ class CommandTable(click.Group):
         return list(self.table())
 
     def get_command(self, ctx: click.Context, name: str) -> click.Command | None:
+        """The command of a name, imported now; None where there is none. Raises Problem E336 where its package cannot
+        load it."""
         point = self.table().get(name)
         if point is None:
             return None
@@ -82,12 +84,14 @@ class CommandTable(click.Group):
     def resolve_command(
         self, ctx: click.Context, args: list[str]
     ) -> tuple[str | None, click.Command | None, list[str]]:
+        """The command of the first argument. Raises UsageError for an unknown one, with what may be meant."""
         name = args[0]
         if name not in self.table() and not name.startswith("-"):
             raise click.UsageError(f"no command `{name}`{self._meant(name)}", ctx)
         return super().resolve_command(ctx, args)
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """Write the list of commands in groups; of one that cannot be loaded, the reason."""
         lines = dict[str, str]()
         for name in self.table():
             try:
@@ -104,6 +108,7 @@ class CommandTable(click.Group):
                     formatter.write_dl(rows)
 
     def _meant(self, name: str) -> str:
+        """The end of the message about an unknown command: what may be meant."""
         if name.endswith(".ic"):
             return f"; did you mean `met run {name}`?"
         close = nearest(name, self.table())
@@ -315,6 +320,8 @@ def _form_asked(arguments: Sequence[str]) -> str:
 
 
 def _run(arguments: list[str]) -> int:
+    """Run the command of these arguments; returns its exit status. What it raises is printed as a message, but for
+    OutputLost."""
     form = _form_asked(arguments)
     verbose = "-v" in arguments or "--verbose" in arguments
     try:

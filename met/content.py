@@ -70,7 +70,8 @@ class Hump:
 
 
 def humps_of_turns(points: Sequence[tuple[float, float]]) -> Iterator[Hump]:
-    """The humps between the points at which a course turns back (`SMALL`); if there are very many, the highest."""
+    """The humps of a course (a value as a function of time) between the points at which it turns back by more than
+    `SMALL`; if there are very many, the highest. points: time, s, and value."""
     times, values = (list(column) for column in zip(*points, strict=True))
     every, heights = np.array(times), np.array(values)
     turned = list(_turned(values))
@@ -89,7 +90,8 @@ def humps_of_turns(points: Sequence[tuple[float, float]]) -> Iterator[Hump]:
 
 
 def humps_from_zero(points: Sequence[tuple[float, float]], until: float) -> Iterator[Hump]:
-    """The parts of one sign of a course, from 0 s to `until`, each between two of its zeros."""
+    """The parts of one sign of a course (a value as a function of time), from 0 s to `until`, each between two of its
+    zeros."""
     times, values = np.array(points).T
     inner = (times > 0.0) & (times < until)
     ends = np.interp([0.0, until], times, values)

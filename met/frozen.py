@@ -46,6 +46,7 @@ def frozen(cls: type[T] | None = None, /, *, kw_only: bool = False) -> type[T] |
     """Make a class a frozen dataclass, compared and hashed by its fields."""
 
     def make(cls: type[T]) -> type[T]:
+        """The class as a frozen dataclass, with methods that compare and hash by its fields."""
         cls.__doc__ = cls.__doc__ or ""  # else dataclasses writes one, from a signature that is slow to make
         frozen_class = dataclasses.dataclass(init=False, eq=False, repr=False, kw_only=kw_only)(cls)
         _compile_later(frozen_class)

@@ -133,7 +133,8 @@ def _check_names(kind: Kind, model: Any, found_at: str) -> None:
 
 
 def _of_engine(kind: Kind, model: Any) -> tuple[tuple[str, str, str], ...]:
-    """Name, unit and meaning of the numbers that the engine holds for a bed, or for a law, besides its own memory."""
+    """Name, unit and meaning of the numbers that the engine holds for a motor bed, or for its law, besides its own
+    memory."""
     if kind == "bed":
         from met.substitution.bed import of_bed
 
@@ -176,7 +177,8 @@ def _check_units(model: Any, found_at: str) -> None:
 
 
 def _check_bed(model: Any, found_at: str) -> None:
-    """Check that a bed model declares the parameters that laws and the wire read by name (met/substitution/bed.py)."""
+    """Check that a motor bed's model declares the parameters that laws and the wire read by name
+    (met/substitution/bed.py)."""
     from met.substitution.bed import check
 
     wrong = check(model)
@@ -229,7 +231,7 @@ def written(model: Any) -> tuple[Parameter, ...]:
 
 
 def has_motor(servo: Any) -> bool:
-    """True where a bed may replace this servo's motor: it has one, and its computer sets the voltage."""
+    """True where a motor bed may replace this servo's motor: the servo has one, and its computer sets the voltage."""
     return servo.motor is not None and any(output.name == "voltage" for output in servo.outputs)
 
 

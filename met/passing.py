@@ -69,6 +69,8 @@ def run_past(
     wanted, starts, ended = frozenset(instants), range(0, cases, kernel.lanes), threading.Event()
 
     def work(start: int) -> None:
+        """Run the block of cases that begins with case `start`, and keep its memory at the instants; returns the number
+        of cases."""
         block = kernel.block(inputs[start : start + kernel.lanes])
         lanes = slice(start, min(start + kernel.lanes, cases))
         width, first, instant_numbers = lanes.stop - lanes.start, 0, iter(range(len(instants)))

@@ -33,7 +33,7 @@ def servo_period(experiment: Experiment) -> float:
 
 
 def plant_program(experiment: Experiment, joint: str, *, case: int = 0, period: float | None = None) -> Program:
-    """The program of a joint's emulated bed.
+    """The program of a joint's emulated motor bed: a drive motor and a load motor on one shaft, with its sensors.
 
     inputs   V and A that the amplifiers hold (N m or rad/s for V where the drive is told that); what `start` alone
              reads: rate of the shaft, rad/s; seed and repeat of the noise
@@ -91,8 +91,8 @@ class Plant:
 
 
 def plant_c(experiment: Experiment, joint: str, *, case: int = 0, period: float | None = None) -> str:
-    """The program of `plant_program` as C, for a bed's firmware: the text of plant.c, whose functions
-    hw/firmware/plant.h declares.
+    """The program of `plant_program`, a joint's emulated motor bed, as C for a bed's firmware: the text of plant.c,
+    whose functions hw/firmware/plant.h declares.
 
     Parameters as in `plant_program`.
     """
@@ -139,7 +139,7 @@ def plant_c(experiment: Experiment, joint: str, *, case: int = 0, period: float 
 
 
 def bed_values(experiment: Experiment, joint: str, case: int = 0) -> dict[str, float]:
-    """The numbers of a joint's bed in a case, SI, by the names of its parameters."""
+    """The numbers of a joint's motor bed in a case, SI, by the names of its parameters."""
     head = f"{joint}.bed."
     by_path = {path: quantity.value for path, quantity in experiment.parameters.items() if path.startswith(head)}
     by_path |= _settled(experiment, joint, case)
@@ -147,7 +147,7 @@ def bed_values(experiment: Experiment, joint: str, case: int = 0) -> dict[str, f
 
 
 def _beds(experiment: Experiment) -> Substituted:
-    """The experiment's beds, without its arm."""
+    """The motor beds of an experiment's joints, without its arm."""
 
     def no_arm(tape: Tape) -> tuple[list[list[Real]], list[Real]]:
         raise AssertionError("a bed alone asks nothing of an arm")
@@ -165,6 +165,8 @@ class _Phases:
     settled: dict[str, float]
 
     def program(self) -> Program:
+        """The program of the bed alone: it begins at a rate, holds its inputs, advances by a period, and gives its
+        readings."""
         names = ("settle", "begin", "hold", "bed", "read")
         settle, begin, hold, bed, read = (CallPhase(Phase(name, getattr(self, name))) for name in names)
         return Program(
@@ -192,6 +194,7 @@ class _Phases:
         self.beds.advance_bed(tape, self.mounted, self.period, seed=seed, repeat=repeat, tick=tick)
 
     def read(self, tape: Tape) -> None:
+        """Give out the readings of the bed: its filtered rate, and rate and angle of the shaft itself."""
         tape.output("rate", self.beds.reading(tape, self.mounted))
         tape.output("shaft_rate", tape.read(f"{self.mounted.joint}.bed.shaft_rate"))
         knows_angle = any(memory.name == "shaft_angle" for memory in self.mounted.bed.memory)

@@ -42,6 +42,7 @@ class _UnitReader:
         self.position = 0
 
     def whole(self) -> Measure:
+        """The measure of the whole text. Raises ValueError."""
         result = self.product()
         if self.position < len(self.pieces):
             raise ValueError(f"unit `{self.written}`: cannot read `{self.pieces[self.position]}`")
@@ -57,6 +58,7 @@ class _UnitReader:
         return self.position < len(self.pieces) and self.pieces[self.position] in wanted
 
     def product(self) -> Measure:
+        """The measure of factors joined by `*` and `/`. Raises ValueError."""
         result = self.factor()
         while self.next_is("*", "/"):
             sign = 1 if self.take() == "*" else -1

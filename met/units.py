@@ -78,6 +78,7 @@ class Measure:
         return Fraction(self.over, self.under) * Fraction(_PI, _PI_BELOW) ** self.turns
 
     def __mul__(self, other: Measure) -> Measure:
+        """The measure of the product of two units."""
         over, under = self.over * other.over, self.under * other.under
         common = math.gcd(over, under)
         return Measure(
@@ -171,7 +172,7 @@ def _exactly(number: float, decimal: str) -> tuple[int, int]:
 
 
 def _divided(over: int, under: int, turns: int) -> float:
-    """over / under * pi^turns, the nearest double. (Python divides whole numbers of any size and rounds once.)"""
+    """The double nearest to over / under * pi^turns. (Python divides whole numbers of any size and rounds once.)"""
     if turns > 0:
         over, under = over * _PI**turns, under * _PI_BELOW**turns
     elif turns < 0:
@@ -334,6 +335,7 @@ def _known_product(factors: tuple[tuple[str, int], ...]) -> Measure:
 
 
 def _product(factors: Iterable[tuple[str, int]], declared: Mapping[str, Measure]) -> Measure:
+    """The measure of a product of units with exponents. Raises ValueError for an unknown unit."""
     result = ONE
     for name, exponent in factors:
         if name not in ALL_UNITS and name not in declared:

@@ -373,6 +373,7 @@ def _apart(name: str, word: str, taken: Collection[str], fellows: Collection[str
 
 
 def _coordinate(experiment: Experiment, coordinate: Coordinate, name: str) -> Variable:
+    """The variable of an archive that holds a varied parameter, [case]."""
     written: dict[str, Any] = {
         "deck_unit": coordinate.unit,
         "deck_scale": coordinate.scale,
@@ -463,6 +464,7 @@ def _attributes(experiment: Experiment, variables: list[Variable]) -> dict[str, 
 
 
 def _step_errors(experiment: Experiment, variables: list[Variable]) -> dict[str, str]:
+    """The attribute of requirements on errors by the step; none where there are none."""
     if not experiment.step_errors:
         return {}
     names = {variable.key: variable.name for variable in variables if variable.role == "metric"}
@@ -470,6 +472,7 @@ def _step_errors(experiment: Experiment, variables: list[Variable]) -> dict[str,
 
 
 def _search(experiment: Experiment, variables: list[Variable]) -> dict[str, Any]:
+    """The attributes of a search; none for other experiments."""
     if experiment.search is None:
         return {}
     names = {variable.key: variable.name for variable in variables if variable.role == "metric"}

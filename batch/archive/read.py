@@ -264,6 +264,7 @@ class ArchiveFile:
             raise
 
     def _check(self, attributes: dict[str, Any]) -> None:
+        """Check that the file is an archive that this MET can read. Raises Problem E302, E303, or Unlike."""
         if attributes.get("schema") != SCHEMA:
             raise Problem(error("E302", f"{self.path} is an HDF5 file, but no archive of MET"))
         version = attributes.get("schema_version")

@@ -162,7 +162,8 @@ def _decoded(attributes: Mapping[str, Any], name: str, kind: Any) -> Any:
 
 
 def _why_not_against(attrs: Mapping[str, Any], *, more: int) -> str:
-    """The reason why a search cannot be judged against the stored plants. more: coordinates that are not chosen"""
+    """The reason why the number of plants (cases of a sweep to judge candidates on) that a group's attributes have is
+    unsound; empty where it is sound. more: coordinates that are not chosen."""
     against, plants, tunes = attrs.get("search_against", ""), attrs.get("search_plants", 0), attrs["search"] == "tune"
     if not bool(against) == bool(plants) == (more > 0):
         return "attribute `search_plants` is not of its coordinates"
@@ -201,6 +202,7 @@ def _why_not_in(group: StoredGroup, chosen: Sequence[Stored]) -> str:
 
 
 def _is_range(variable: Stored) -> bool:
+    """True if a coordinate's attributes are the ends of a range that can be searched."""
     low, high = (variable.attributes.get(name) for name in ("low", "high"))
     if not isinstance(low, float) or not isinstance(high, float) or not -math.inf < low < high < math.inf:
         return False

@@ -71,6 +71,8 @@ class Sink:
         return bytes(buffer)
 
     def write(self, data: memoryview) -> int:
+        """Write bytes at the present position. A failure is kept in `failure`, and raises nothing, which HDF5 would not
+        survive."""
         view = memoryview(data).cast("B")
         left = view
         while len(left) and self.failure is None:
@@ -85,6 +87,7 @@ class Sink:
         return len(view)
 
     def truncate(self, size: int | None = None) -> int:
+        """Set the file's length. A failure is kept in `failure`, and raises nothing."""
         size = self._position if size is None else size
         if self.failure is None:
             try:

@@ -118,6 +118,7 @@ def _names(group: StoredGroup) -> None:
 
 
 def _attributes(attributes: dict[str, Any]) -> None:
+    """Check the attributes of an experiment's group: their types, and numbers within bounds. Raises Unlike."""
     for name, types in ATTRIBUTES.items():
         value = attributes.get(name)
         if not isinstance(value, types) or isinstance(value, bool):

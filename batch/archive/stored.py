@@ -106,6 +106,7 @@ def dimensions(declared: Declared) -> Sequence[str]:
 
 
 def _values(node: Any, name: str, declared: Declared, group: str) -> np.ndarray:
+    """The values of a declared variable of a group. Raises Unlike where it is missing or of another type or size."""
     dims, kind, _ = declared[name]
     dataset = node.get(name)
     if not isinstance(dataset, h5py().Dataset) or str(dataset.dtype.str) != kind:

@@ -162,6 +162,7 @@ class ArchiveWriter:
         self._sink.close()
 
     def _nodes(self) -> list[Any]:
+        """Make the groups of an archive: the root alone for one experiment."""
         root = self._file
         root.attrs["schema"] = archive_layout.SCHEMA  # of variable length, so that it lies near the head (`is_archive`)
         put_attributes(root, {"schema_version": archive_layout.VERSION, "deck": self.plan.deck})
@@ -205,6 +206,7 @@ class ArchiveWriter:
         keepers: dict[str, recipes.ArrayKeeper] = {}
 
         def refer(experiment: Experiment, index: int) -> Any:
+            """The reference to a column of a case table in the archive's provenance: a row of a table, or a recipe."""
             name = f"cases.{experiment.name}"
             if experiment.cases.count <= (LISTED_ROWS if summed else plan_file.TABLE_ROWS):
                 if name not in tables:

@@ -216,6 +216,7 @@ def _arrows(
 
 
 def _jet(jet: Jet, world: ArmWorld) -> list[Real]:
+    """The numbers by which a page draws a jet: point and axis in the world, its strength, and the plate."""
     point, axis = world.position(jet.link, jet.point), world.to_world(jet.link, jet.axis)
     sides = [world.to_world(jet.plate.link, side) for side in (jet.plate.width, jet.plate.height)]
     middle = world.position(jet.plate.link, jet.plate.middle)

@@ -50,6 +50,7 @@ def triangles(name: str, data: bytes) -> np.ndarray:
 
 
 def _stl(data: bytes) -> np.ndarray:
+    """The triangles of an STL file, binary or text, [triangle, corner, 3]. Raises MeshFault."""
     count = int.from_bytes(data[80:STL_HEAD], "little") if len(data) >= STL_HEAD else -1
     if 0 <= count == (len(data) - STL_HEAD) / STL_TRIANGLE:
         kind = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
@@ -65,6 +66,7 @@ def _stl(data: bytes) -> np.ndarray:
 
 
 def _obj(data: bytes) -> np.ndarray:
+    """The triangles of an OBJ file, [triangle, corner, 3], faces of more corners cut into fans. Raises MeshFault."""
     _limit(sum(1 for _ in _OBJ_POINT.finditer(data)))
     written = list(_OBJ_POINT.finditer(data))
     points, starts = _numbers([point.groups() for point in written]), [point.start() for point in written]

@@ -231,6 +231,7 @@ def _end(arm: ArmNumbers, name: str) -> Vector:
 
 
 def _limb(experiment: Experiment, first: Mapping[str, float], reach: float) -> float:
+    """The thickness of drawn links, m, by the arm's reach and the middle one of its links' lengths."""
     ways = [_size(experiment, first, link.name) for link in experiment.structure.links]
     lengths = sorted(way for way in ways if way > 1e-6 * reach)
     middle = lengths[len(lengths) // 2] if lengths else reach

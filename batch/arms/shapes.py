@@ -136,6 +136,7 @@ def shape_of(arm: ArmNumbers, body: Link | Payload) -> tuple[str, dict[str, Real
 
 
 def _solid(arm: ArmNumbers, body: Link | Payload, role: Literal["link", "payload"]) -> ArmShape:
+    """The drawn solid of a link or payload, from the shape that the deck gives it, in metres in its frame."""
     kind, sizes = shape_of(arm, body)
     along = int(dict(body.shape[1]).get("along", 0.0)) if body.shape is not None else 0
     axis: Vector = (float(along == 0), float(along == 1), float(along == 2))

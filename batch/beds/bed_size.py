@@ -43,12 +43,17 @@ class FilterRange:
 def filter_range(
     experiment: Experiment, joint: str, rows: Sequence[int], ratio: tuple[float, float], margin: float
 ) -> FilterRange:
-    """The filters of a joint's bed. rows: cases to examine; ratio: smallest and largest r over a run. If other joints
-    are on beds too, r is that of all their motions at the start instead."""
+    """The filters of the rate with which a joint's motor bed is stable.
+
+    rows   cases to examine
+    ratio  smallest and largest r (arm's inertia against the rotor's) over a run; if other joints are on beds too, r is
+           that of all their motions at the start instead
+    """
     alone = len(experiment.structure.substitutions) == 1
     path = f"{joint}.bed.f_cut"
 
     def tightest(variant: Experiment) -> Margin:
+        """The margin of the joint in the case in which the arm is nearest to the stability limit."""
         cases = margins(variant, rows, span=ratio if alone else None, reach=margin)
         return min(
             (margin for case in cases for margin in case if margin.joint == joint), key=lambda margin: margin.room
@@ -137,7 +142,8 @@ def bed_size(
     rows: np.ndarray | None = None,
     progress: Callable[[int], None] | None = None,
 ) -> BedSize:
-    """The sizes of a bed over all cases, or those of some rows of the case table. Raises Problem.
+    """What all cases, or those of some rows of the case table, ask of the two motors of a joint's motor bed. Raises
+    Problem.
 
     named     parts by `drive` and `load`; none: all that are listed
     progress  called with the number of cases done so far
@@ -183,7 +189,7 @@ def _bench(bench: Bench, listed: PartsList) -> tuple[Candidate, Candidate]:
 
 
 def _notes(experiment: Experiment, joint: str, figures: BedFigures, candidates: Sequence[Candidate]) -> Iterator[str]:
-    """Sentences on what the sizes of a bed leave out, and on cases in which a motor was at its limit."""
+    """Sentences on what the sizing of a motor bed leaves out, and on cases in which a motor was at its limit."""
     use, schedule = servo_of(experiment, joint), experiment.structure.schedule
     assert use is not None
     yield "all of it is simulated: no real bed has been driven with this version"

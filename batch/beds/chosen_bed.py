@@ -63,6 +63,8 @@ def chosen_bed(
 
 
 def _chosen_bed(word: str, plan: Plan | None, names: tuple[str, ...]) -> ChosenBed:
+    """The bed (a motor under test with its load) that a `--port` names, and the deck's joint that it stands for, if
+    there is a deck. Raises Problem E418 where it is unclear of which joint."""
     joint, port = split(word)
     if plan is None:
         return ChosenBed(port)

@@ -96,6 +96,7 @@ class OnBeds:
         return self._done
 
     def open(self, folder: Folder, sections: Mapping[int, CampaignSection], tell: Callable[[], None]) -> None:
+        """Open the campaign's folder for records. Raises Problem E353 where cases in it were driven on other beds."""
         self._folder, self._sections, self._tell = folder, sections, tell
         folder.beds.mkdir(exist_ok=True)
         for path in folder.beds.glob("*.records"):
@@ -114,6 +115,8 @@ class OnBeds:
         self._waiting.append(task)
 
     def wait(self) -> list[Outcome]:
+        """Drive the cases of the next task on the motor beds, one after another, and keep their results as a shard (the
+        file of a task's results). Nothing is done where no task waits."""
         if not self._waiting:
             return []
         task = self._waiting.popleft()
@@ -144,9 +147,11 @@ class OnBeds:
         self._waiting.clear()
 
     def check(self, before: Mapping[str, str], benches: Any, what: str) -> None:
-        """Raise Problem E353 where cases were driven at other ports, or on other benches. before: port by joint;
-        benches: what told its bench from others, in words by name, by joint; what: the place of those cases, in
-        words"""
+        """Raise Problem E353 where cases were driven at other ports, or on other benches (real motors with their load).
+
+        before   ports by joint;  benches: what told its bench from others, in words by name, by joint
+        what     the place of those cases, in words
+        """
         helps = "`--fresh` starts over, and removes what is done; `-o OTHER.h5` leaves it, and runs beside it"
         for joint, port in before.items():
             message = f"{what}, driven at `{port}`, and is left as it is"

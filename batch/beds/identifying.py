@@ -378,7 +378,8 @@ def _packed(words: Iterable[str], indent: int) -> list[str]:
 def as_data(
     fit: FitResult, estimates: Mapping[str, Estimate], sheet: DataSheet, deck: Path, records: Path
 ) -> dict[str, Any]:
-    """The result for programs, SI."""
+    """The result of `met bed identify` for JSON, SI: estimated parameters with their intervals beside the data
+    sheet's."""
     return {
         "deck": str(deck),
         "records": str(records),
@@ -419,6 +420,7 @@ def _driven(request: MovesRequest, say: Callable[[str], None]) -> tuple[About, d
 
 
 def _about(data: Mapping[str, Any]) -> About:
+    """A bed's description from JSON."""
     return About(
         **{
             **data,
@@ -430,6 +432,8 @@ def _about(data: Mapping[str, Any]) -> About:
 
 
 def _fitted(path: Path, about: About, ended: Mapping[str, Any], sheet: DataSheet) -> FitResult:
+    """The parameters of a bed, fitted to the records of its moves. ended: what the moves' process said at its end.
+    Raises Problem E413 for records that cannot be read."""
     from hw.identify.fit import fitted
     from hw.identify.moves import groups, guided
     from hw.identify.series import series

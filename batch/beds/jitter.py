@@ -87,7 +87,8 @@ def jitter_and_tell(
 
 
 def lines(data: Mapping[str, Any]) -> list[str]:
-    """The figures for people, line by line."""
+    """The figures of `met bed jitter` for people, line by line: how late exchanges with the bed began, and how long
+    they took."""
     misses = data["misses"]
     each_period = "" if data["joints"] == 1 else f" in {data['joints']} each period"
     out = [
@@ -148,6 +149,7 @@ def off(share: float) -> str:
 
 
 def _spread(spread: Mapping[str, Any]) -> dict[str, Any]:
+    """The figures of a duration's spread for JSON, s, with its histogram."""
     edges = [0.0, *EDGES, None]
     return {
         **{name: spread[name] if math.isfinite(spread[name]) else None for name, _ in _FIGURES},

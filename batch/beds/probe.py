@@ -100,7 +100,7 @@ def probe_and_tell(
 
 
 def lines(result: ProbeResult) -> Iterator[str]:
-    """The result for people, line by line."""
+    """The result of `met bed probe` for people, line by line: what the bed is, its limits, sensors and faults."""
     about, sample, limits = result.about, result.sample, result.about.limits
     unit, _ = DRIVES[about.drive]
     yield f"bed `{about.name}` at {result.port}"
@@ -134,7 +134,8 @@ def lines(result: ProbeResult) -> Iterator[str]:
 
 
 def data(result: ProbeResult) -> dict[str, Any]:
-    """The result for programs, SI."""
+    """The result of `met bed probe` for JSON, SI: description, state, sensors and faults of the bed (a motor with a
+    load on a test bench)."""
     about, sample = result.about, result.sample
     return {
         "port": result.port,
@@ -196,6 +197,7 @@ def _properties(about: About) -> list[str]:
 
 
 def _trips(bed: BedDriver) -> Iterator[float]:
+    """The times of `ASKED` exchanges with the bed, s, without those that had no answer."""
     bed.patience = 0.1
     for _ in range(ASKED):
         begun = time.perf_counter()
@@ -204,6 +206,7 @@ def _trips(bed: BedDriver) -> Iterator[float]:
 
 
 def _scales(about: About) -> list[tuple[float, str]]:
+    """The smallest step of each quantity that the bed tells or takes, with its unit."""
     s, has = about.scales, about.capabilities
     result = [(s.voltage, DRIVES[about.drive][0]), (s.current, "A"), (s.rate, "rad/s")]
     others = (

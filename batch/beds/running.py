@@ -51,6 +51,7 @@ class BedProgress:
             self._bar.begin(name, cases, done, failed, workers)
 
     def advance(self, done: int, failed: int, more: str = "") -> None:
+        """Show the cases that are done, and how much of the case under way has been driven, s."""
         if self._quiet:
             return
         driving = self._executor.driving
@@ -143,6 +144,7 @@ def sidecar_entries(executor: OnBeds) -> Mapping[str, Any]:
 
 
 def _figures(times: Timing) -> dict[str, Any]:
+    """How well the loop kept its time over the exchanges, for JSON."""
     spreads = {"lateness": times.lateness, "trip": times.trip, "computing": times.computing}
     return {
         "exchanges": times.exchanges,
@@ -156,6 +158,7 @@ def _figures(times: Timing) -> dict[str, Any]:
 
 
 def _spread(time_spread: TimeSpread) -> dict[str, float | None]:
+    """A duration's spread for JSON, s."""
     values = {
         "median": time_spread.median,
         "p99": time_spread.high,
@@ -297,8 +300,8 @@ def run_and_tell(
 
 
 def beds_before(archive: Path) -> tuple[dict[str, str], dict[str, Any]]:
-    """The ports at which an archive was driven, and what told their benches from others, both by joint, from the file
-    beside it. Raises Problem E302."""
+    """The ports at which an archive's cases were driven, and what told their benches (real motors with their load) from
+    others, both by joint, from the file beside it. Raises Problem E302."""
     path = sidecar_path(archive)
     try:
         beds = {str(bed["joint"]): bed for bed in read_json(path).get("beds", ())}

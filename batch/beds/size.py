@@ -45,7 +45,8 @@ ROLES = ("drive", "load")
 
 
 def size_lines(size: BedSize, *, named: bool, curves: bool = False) -> Iterator[str]:
-    """The sizes in lines. named: whether the parts were named;  curves: with the torque-speed curves."""
+    """What the cases ask of both motors of a motor bed, and the parts that fit, in lines. named: whether the parts were
+    named;  curves: with the torque-speed curves."""
     figures, several = size.figures, size.experiment.varies
     duration = size.experiment.structure.schedule.duration
     yield (
@@ -172,6 +173,7 @@ def _binding(verdict: PartVerdict) -> str:
 
 
 def _verdict(verdict: PartVerdict) -> str:
+    """The verdict on a part in words, with the check that binds."""
     if verdict.fits is None:
         return f"not known, for its source does not give: {', '.join(verdict.missing)}"
     assert verdict.binds is not None
@@ -279,6 +281,7 @@ def _of_archive(source: str, names: Sequence[str]) -> tuple[Plan, dict[str, np.n
 
 
 def _on_beds(plan: Plan, names: Sequence[str]) -> Sequence[Experiment]:
+    """The experiments with motors on beds. Raises Problem E333, which names `--joint`, where there is none."""
     try:
         return on_beds(plan, names or None)
     except Problem as problem:
@@ -289,7 +292,8 @@ def _on_beds(plan: Plan, names: Sequence[str]) -> Sequence[Experiment]:
 
 
 def as_data(size: BedSize) -> dict[str, Any]:
-    """The sizes for programs, SI."""
+    """The result of `met bed size` for JSON, SI: what the cases ask of both motors of the bed, and the parts that
+    fit."""
     figures = size.figures
     own = size.filter.own
     return {
@@ -331,6 +335,7 @@ def as_data(size: BedSize) -> dict[str, Any]:
 
 
 def _verdict_as_data(verdict: PartVerdict) -> dict[str, Any]:
+    """What a part of a bench has of what the bed needs, for JSON: each check's demand, and the one that binds."""
     binds = verdict.binds
     return {
         "role": verdict.role,

@@ -79,6 +79,7 @@ class Largest:
         self._keep(name, Extreme(most, int(work.case[row]), *instant))
 
     def _keep(self, name: str, extreme: Extreme) -> None:
+        """Keep an extreme where it is the largest so far, but for rounding."""
         if name not in self.extremes or extreme.value > self.extremes[name].value + ROUNDING * abs(
             self.extremes[name].value
         ):
@@ -327,7 +328,7 @@ class PartVerdict:
 
     @property
     def binds(self) -> PartCheck | None:
-        """The check with the least room."""
+        """The check by which the part has the least to spare."""
         return max(self.checks, key=lambda check: check.share, default=None)
 
     @property

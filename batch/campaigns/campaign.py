@@ -152,13 +152,14 @@ class Campaign:
         return sum(part.bytes for part in self.parts)
 
     def bytes_of(self, histories: Sequence[tuple[CampaignPart, int]]) -> int:
-        """Approximate room for the histories of these numbers of cases of each part, in shards and in the archive."""
+        """Approximate size of the histories of these numbers of cases of each part, in shards and in the archive,
+        bytes."""
         whole = sum(part.experiment.structure.history_bytes // (2 if part.single else 1) * n for part, n in histories)
         return self.bytes + 2 * whole
 
     @property
     def bytes_missing(self) -> int:
-        """Approximate room on the disk that is needed until the archive is whole, besides the existing shards."""
+        """Approximate number of bytes that the disk must still take until the archive is whole."""
         shards = sum(part.shard_bytes for part in self.parts)
         return self.bytes + shards - min(shards, Folder(beside(self.output)).bytes())
 

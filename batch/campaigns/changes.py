@@ -232,6 +232,7 @@ def _value_text(quantity: Quantity, digits: int = 6) -> str:
 
 
 def _shown_all(quantities: Sequence[Quantity]) -> str:
+    """Values of a vector in words, with its unit."""
     if len(quantities) == 1:
         return _value_text(quantities[0])
     unit = quantities[0].unit
@@ -400,6 +401,7 @@ def _structures(before: Structure, now: Structure) -> Iterator[tuple[str, str]]:
 
 
 def _schedule(before: Schedule, now: Schedule) -> Iterator[str]:
+    """Changes of duration and rates, in words."""
     for name, old, new in (
         ("duration", f"{before.duration:g} s", f"{now.duration:g} s"),
         ("rates.dynamics", f"{before.base_hz / before.dynamics:g} Hz", f"{now.base_hz / now.dynamics:g} Hz"),
@@ -410,6 +412,7 @@ def _schedule(before: Schedule, now: Schedule) -> Iterator[str]:
 
 
 def _base(before: Base | None, now: Base | None) -> Iterator[tuple[str, str]]:
+    """Changes of the base's kind and motion, each with the prefix of paths that follow from it."""
     kinds = ["fixed" if base is None else base.kind for base in (before, now)]
     if kinds[0] != kinds[1]:
         yield f"initial.{BASE}.", f"base: {kinds[0]} -> {kinds[1]}"
@@ -419,6 +422,7 @@ def _base(before: Base | None, now: Base | None) -> Iterator[tuple[str, str]]:
 
 
 def _courses(what: str, path: str, before: Sequence[Course], now: Sequence[Course]) -> Iterator[tuple[str, str]]:
+    """Changes of the commands' models that move components in time, each with the prefix of their paths."""
     old, new = ({course.component: course.model for course in courses} for courses in (before, now))
     for component in dict.fromkeys([*old, *new]):
         models = [models_of.get(component, "none") for models_of in (old, new)]
@@ -475,6 +479,7 @@ def _with_dynamics(divisor: int | None, two: int | None, before: Structure, now:
 
 
 def _sensors(before: Sequence[Any], now: Sequence[Any]) -> Iterator[str]:
+    """Changes of the models of a servo's sensors, in words."""
     old, new = ({sensor.of: sensor.model for sensor in sensors} for sensors in (before, now))
     for source in dict.fromkeys([*old, *new]):
         models = [models_of.get(source, "none") for models_of in (old, new)]

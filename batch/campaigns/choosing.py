@@ -124,6 +124,7 @@ def _case_text(case: int | str) -> str:
 
 
 def _rows(experiment: Experiment, case: int | str) -> list[int]:
+    """The rows of the case table that a user's word means: a row's number, `#7`, or the beginning of case_ids."""
     if _is_row(case):
         position = row_of(case) if isinstance(case, str) else int(case)
         row = None if position is None else row_at(experiment.cases.table, position)

@@ -186,6 +186,7 @@ class _SectionWork:
         self._open = 0
 
     def run(self) -> None:
+        """Run all missing cases of the section, with as many tasks open as there are workers and one more."""
         executor, driver = self._driver.executor, self._driver
         while True:
             while self._open < executor.workers + AHEAD and (task := self._next()) is not None:
@@ -201,6 +202,8 @@ class _SectionWork:
                 driver.check()
 
     def _next(self) -> Task | None:
+        """The next task: one to be tried again, or a stretch of missing cases of a suitable size. None where none is
+        left."""
         if self._again:
             return self._again.popleft()
         if not self._gaps:
@@ -213,6 +216,8 @@ class _SectionWork:
         return Task(self._section.number, first, cut)
 
     def _take(self, outcome: Outcome) -> None:
+        """Count the outcome of a task. A task that was lost or timed out is cut into pieces, and a single case is tried
+        again or given up as failed. Raises Stopped where the campaign cannot go on."""
         task, count = outcome.task, self._driver.counts[self._section.number]
         if outcome.kind == "broken":
             raise Stopped(outcome.why)

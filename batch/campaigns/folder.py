@@ -376,6 +376,7 @@ class Folder:
 
 
 def _other_code(name: str, path: Path, described: dict[str, Any]) -> Any:
+    """The error that a campaign was begun by other code than this (E353). described: its description"""
     message = f"the code of `{name}` here is not that with which {path} was begun: nothing of it is run"
     helps = [
         f"MET or a package of models has changed since; it was begun by MET {described['met']}, this is MET {VERSION}",

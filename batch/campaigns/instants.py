@@ -133,7 +133,7 @@ def standing_out(outcomes: CaseOutcomes) -> list[int]:
 
 
 def _passed(section: CampaignSection, memories: Memories, cases: Sequence[int]) -> passed.Passed:
-    """The telling instants of these cases."""
+    """The memory of these cases at the instants that say most about their steps, of all cases in one table."""
     experiment, cells = section.prepared.experiment, section.prepared.recording.cells
     count = max(passed.LEAST_INSTANTS, passed.instants(experiment) // len(cases))
     places = [passed.telling(experiment, memories.by_case[case], cells, count) for case in cases]

@@ -124,6 +124,8 @@ def judged_best(file: ArchiveFile, designs: Designs, order: np.ndarray, least_ma
         return engine.prepare(experiments[name])
 
     def judge(place: int) -> JudgedDesign:
+        """The stability of a design over all its cases, judged by the worst structure. place: in the order of the
+        designs"""
         pool, judgements = designs.pool, list[JudgedDesign]()
         cases = np.flatnonzero(designs.of_case == order[place])
         for number in np.unique(pool.group_of[cases]).tolist():

@@ -142,6 +142,7 @@ def _with(rules: Keep, word: str | int, experiments: Sequence[Experiment]) -> Ke
 
 
 def _check_metric(metric: str, experiments: Sequence[Experiment]) -> None:
+    """Check that there is a metric by which cases can be the worst. Raises Problem E351."""
     known = list(dict.fromkeys(use.name for experiment in experiments for use in experiment.metrics))
     if not known:
         remedy = "a run has them by `metric NAME = MODEL { of = ...; }`"

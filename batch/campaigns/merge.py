@@ -53,7 +53,8 @@ def merge(
     *,
     threads: int | None = None,
 ) -> CaseOutcomes:
-    """Write one experiment; returns the outcomes of its cases. Raises Missing.
+    """Write one experiment's cases into the archive, from the shards (files of tasks' results); returns their outcomes.
+    Raises Missing.
 
     values     all of its cases;  histories: those that were run again for them
     progress   told how many cases are written
@@ -68,10 +69,12 @@ def merge(
     def block_results(
         first: int, outputs: np.ndarray, fates: dict[int, tuple[int, str]]
     ) -> tuple[int, Run, Mapping[str, Any]]:
+        """The results of a block of cases, and the values of their variables in the archive."""
         run = _results(values, first, outputs, None, fates)
         return first, run, writer.case_values(number, run)
 
     def shards(pool: ThreadPoolExecutor) -> Iterator[tuple[int, Shard]]:
+        """The section's shards in order, with the place of the first case; their histories are written on the way."""
         for start, read_shard in shards_in_order(folder, values, pool):
             if read_shard.history is not None:
                 run = _results(values, start, read_shard.outputs.copy(), read_shard.history, dict(read_shard.fates))
@@ -79,6 +82,8 @@ def merge(
             yield start, read_shard
 
     def calls(pool: ThreadPoolExecutor) -> Iterator[Callable[[], tuple[int, Run, Mapping[str, Any]]]]:
+        """Calls that compute the results of the blocks in turn, while cases to be compared with a second run are
+        noted."""
         for first, outputs, fates in in_blocks(shards(pool)):
             again = np.flatnonzero((places >= first) & (places < first + len(outputs)))
             cases = places[again] - first
@@ -139,10 +144,14 @@ def results(folder: Folder, section: CampaignSection, most: Mapping[str, int] | 
 def shards_in_order(
     folder: Folder, section: CampaignSection, pool: ThreadPoolExecutor | None = None
 ) -> Iterator[tuple[int, Shard]]:
-    """The shards of a section in order, without cases of earlier ones, each with the place of its first case. pool:
-    reads some in advance, unless they have histories, which would take much memory. Raises Missing."""
+    """The shards (files of tasks' results) of a section in order, without cases of earlier ones, each with the place of
+    its first case. Raises Missing.
+
+    pool  threads that read some in advance, unless they have histories, which would take much memory
+    """
 
     def read(task: Task, end: int) -> tuple[int, Shard]:
+        """A task's shard without cases before `end`, and `end`. Raises Missing."""
         try:
             return end, _without(folder.read(section, task), end - task.first)
         except (UnsoundShard, OSError) as reason:
@@ -193,8 +202,8 @@ def runs_in_blocks(folder: Folder, section: CampaignSection, threads: int | None
 
 
 def ahead(pool: ThreadPoolExecutor | None, calls: Iterable[Callable[[], T]], most: int) -> Iterator[T]:
-    """The results of these calls, in order, computed by a pool of threads, at most `most` beyond the current one;
-    without a pool, each on request."""
+    """The results of these calls, in order; the threads of a pool compute at most `most` beyond the current one.
+    Without a pool each is computed when it is taken."""
     waiting: deque[Future[T]] = deque()
     try:
         for call in calls:
@@ -260,6 +269,8 @@ def _results(
     history: np.ndarray | None,
     fates: dict[int, tuple[int, str]],
 ) -> Run:
+    """The results of the cases of a stretch, from the kernel's outputs. fates: cases that did not end, with the status
+    and the reason."""
     rows = section.rows[first : first + len(outputs)]
     return engine.results(section.prepared, rows, history, outputs, fates)
 

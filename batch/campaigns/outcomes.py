@@ -65,7 +65,7 @@ class CaseOutcomes:
         self.count += len(status)
 
     def add_run(self, run: Run) -> None:
-        """Take the next cases from their results."""
+        """Count the requirements that the next cases meet, miss, and leave open."""
         self.add(run.status, run.metrics)
         for requirement in self._experiment.requirements:
             value = ~np.isnan(run.metrics[requirement.metric])
@@ -124,6 +124,7 @@ class _Worst:
         self._bad, self.places = np.zeros(0), np.zeros(0, np.int64)
 
     def add(self, values: np.ndarray, first: int) -> None:
+        """Take the next values, [case], and keep the places of the worst. first: the place of the first"""
         bad = self._sign * values
         some = np.flatnonzero(~np.isnan(bad))
         if len(self._bad) == self._most:

@@ -445,6 +445,7 @@ class _CampaignWork:
         ]
 
     def _tell_found(self, *, first: bool) -> None:
+        """Say what was found of an earlier run of the campaign."""
         driver = self.driver
         assert driver is not None
         for text in driver.messages:
@@ -460,6 +461,7 @@ class _CampaignWork:
 
 
 def _stopped(code: str, message: str, work: _CampaignWork, how: str = "") -> Diagnostic:
+    """The error of a campaign that stopped, with what is kept of it. how: further words on how to go on"""
     has_folder = work.folder.path.exists()
     helps = (
         f"what is done is kept in {work.folder.path}: the same command goes on{how}"

@@ -74,7 +74,7 @@ def rehearse(timeout: float | None, **question: Any) -> None:
 
 
 def _ended(process: subprocess.Popen[bytes], limit: float | None) -> str:
-    """The end of the process, in words."""
+    """How a process ended, in words, after a wait of at most `limit` s; one that goes on is sent SIGABRT."""
     try:
         status = process.wait(limit)
     except subprocess.TimeoutExpired:

@@ -162,6 +162,7 @@ def _signals(old: ArchiveGroup, new: ArchiveGroup, places: np.ndarray, ran: np.n
 
 
 def _alike(before: np.ndarray, after: np.ndarray) -> np.ndarray:
+    """True where two arrays have the same bits; all not-a-numbers are alike."""
     if before.dtype.kind == "f":
         whole = np.dtype(f"i{before.dtype.itemsize}")
         bits = [np.ascontiguousarray(values, before.dtype).view(whole) for values in (before, after)]

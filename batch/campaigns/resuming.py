@@ -225,6 +225,7 @@ def described(folder: Folder) -> Campaign:
 def _of_another(
     folder: Folder, campaign: Campaign, values: Sequence[CampaignSection], description: dict[str, Any]
 ) -> Any:
+    """The error for a folder that holds cases of another campaign, with what differs (E353)."""
     done = sum(task.cases for number in range(len(description["sections"])) for task in folder.named_tasks(number))
     try:
         differences = changes(folder.plan(), campaign.plan)

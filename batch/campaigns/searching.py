@@ -190,6 +190,8 @@ class CampaignSearch:
         return answer(self.search, table, np.concatenate(self._done), metrics, self._requirements)
 
     def _complete(self) -> None:
+        """Complete the search at its end: its generations, its starts, the stability of its designs, and the answer on
+        fresh cases where the deck asks for it."""
         prepared = self.section.prepared
         search = replace(self.search, generations=tuple(self._generations), **steps_of(self._method))
         search = replace(search, starts=starts_of(self._method, search, self._table, self.worth))
@@ -251,7 +253,7 @@ Held = list[tuple[Task, tasks.Shard]]
 def _held(
     driver: Driver, section: CampaignSection, first: int, last: int, *, tell: bool
 ) -> tuple[Held, list[tuple[int, int]]]:
-    """The shards of a stretch of cases, and what is missing of it.
+    """The shards (files of results) that there are for a stretch of cases, and the parts of it that are missing.
 
     tell  whether what is found counts as done before, and what is no shard is told of
     """

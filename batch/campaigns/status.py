@@ -76,6 +76,7 @@ class Reporter:
             self._progress.begin(name, cases, done, failed, workers)
 
     def advance(self, done: int, failed: int, more: str = "") -> None:
+        """Take the numbers of done and failed cases, show them, and write the status file now and then."""
         self._take(done, failed)
         self._record["more"] = more
         if time.monotonic() > self._next:
@@ -96,6 +97,7 @@ class Reporter:
         self._record |= {"section_done": done, "failed": failed}
 
     def _write(self) -> None:
+        """Write the status file; a full disk is left to whoever writes results."""
         self._next = time.monotonic() + WRITE_SECONDS
         self._record["updated"] = time.time()
         try:

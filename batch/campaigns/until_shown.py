@@ -31,6 +31,7 @@ class StoppingPoints:
     """The design points of a section, with their known cases and their stops."""
 
     def __init__(self, section: CampaignSection) -> None:
+        """Number the design points of a section's cases; none of the cases is known yet."""
         experiment = section.prepared.experiment
         chosen = [
             coordinate.values[section.rows] for coordinate in experiment.cases.coordinates if not coordinate.design
@@ -102,8 +103,8 @@ class StoppingPoints:
         return sorted(stretches)
 
     def _batch(self, places: np.ndarray, known: int, busy: int) -> int:
-        """The number of cases of a design point that are run before its next test, at least `busy`; one on motor beds,
-        where each case takes its full time."""
+        """The number of cases of a design point that are run before its next test, at least `busy`; one where cases are
+        driven on motor beds."""
         if self._section.prepared.wire:
             return 1
         batch = max(busy, min(self._needed(places, known), max(FIRST_CASES, known // GROWTH)))
@@ -126,7 +127,8 @@ class StoppingPoints:
         return len(places) if known.all() else int(known.argmin())
 
     def _stop(self, places: np.ndarray) -> int | None:
-        """The number of cases at which a design point stops; None where its known cases do not decide it."""
+        """The number of cases after which a design point stops, as all its requirements are decided; None where its
+        known cases do not decide it."""
         known = self._prefix(places)
         cases, stop = np.arange(1, known + 1), 0
         for limit, missed in zip(self._limits, self._missed[places[:known]].T, strict=True):

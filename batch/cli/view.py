@@ -91,6 +91,7 @@ def _write(
     *,
     meshes: bool,
 ) -> int:
+    """Write the page of an archive, and say where it is; returns the exit status. output: None: beside the archive."""
     from batch.portable import files
     from batch.portable.page import view as page
     from ic.printing.columns import size
@@ -124,6 +125,8 @@ def _watch(
     quiet: bool,
     verbose: bool,
 ) -> int:
+    """Show a deck's run on a page that follows each save of the deck, until the command is ended; returns the exit
+    status."""
     from batch.executors.termination import TERMINATED, Terminated, terminable
     from batch.watching.answers import WatchedDeck
     from batch.watching.following import follow

@@ -174,7 +174,7 @@ def _last_digits(a: ArchiveGroup, b: ArchiveGroup, matched: MatchedCases) -> str
 
 
 def _how(scores: _Scores, matched: MatchedCases, b: ArchiveGroup, experiment: ExperimentDiff) -> np.ndarray:
-    """The place in VERDICTS of each matched case. A case with another ending is different."""
+    """The verdict on each matched case, as its place in VERDICTS, [case]; a case that ended otherwise is different."""
     out = np.where(scores.unlike, VERDICTS.index(EQUIVALENT), VERDICTS.index(IDENTICAL)).astype(np.int8)
     out[scores.beyond] = VERDICTS.index(DIFFERENT)
     if experiment.ended:
@@ -467,7 +467,7 @@ def _instants(a: np.ndarray, b: np.ndarray, allowed: Tolerances, cases: int) -> 
 
 
 def _histories(group: ArchiveGroup, name: str, places: np.ndarray) -> np.ndarray:
-    """[case, row, column], of the recorded cases at these places."""
+    """A signal's numbers in the recorded cases at these places, [case, row, column]."""
     values = group.histories(name, places)
     return values.reshape(*values.shape[:2], -1).astype(np.float64, copy=False)
 

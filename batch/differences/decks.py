@@ -65,7 +65,8 @@ class Decks:
 
 
 def decks(a: Mapping[str, str], b: Mapping[str, str]) -> Decks:
-    """a, b: texts of the files by name, the deck itself first."""
+    """The differences between the decks of two archives, file by file. a, b: texts of the files by name, the deck
+    itself first."""
     pairs = _pairs(a, b)
     changes, fresh, stale = [], set(), set()
     for old, new in pairs:
@@ -158,7 +159,8 @@ def _unified(before: Sequence[str], now: Sequence[str]) -> Iterator[str]:
 
 
 def _names(a: Mapping[str, str], b: Mapping[str, str]) -> Iterator[str]:
-    """`let`s and macros of both decks whose texts differ; one that is written several times is left to its lines."""
+    """Changes of `let`s and macros of both decks whose texts differ; one that is written several times is left to its
+    lines."""
     old, new = (
         _written({name: text for name, text in mine.items() if other.get(name) != text})
         for mine, other in ((a, b), (b, a))

@@ -83,7 +83,8 @@ def _compare_step_errors(a: ArchiveGroup, b: ArchiveGroup, out: ExperimentDiff) 
 
 
 def _compare_evidence(a: ArchiveGroup, b: ArchiveGroup, now: Mapping[str, str], out: ExperimentDiff) -> None:
-    """Pair the rows of both tables of evidence. now: the text in b of each common requirement of a"""
+    """Pair the rows of evidence (what the cases show of each requirement) of both archives. now: the text in b of each
+    common requirement of a."""
     rows_a, other = (requirement_evidence([group], str(group.path), several=True) for group in (a, b))
     rows = {(row.requirement, row.at): row for row in other}
     for row in rows_a:

@@ -43,6 +43,7 @@ def diff_lines(difference: Diff, cut: Shortening | None = None) -> list[str]:
 
 
 def _changed(difference: Diff, cut: Shortening) -> Iterator[str]:
+    """The lines about what was changed between two archives: deck, models, MET."""
     lines_of = words.provenance_lines(difference)
     yield ""
     if not lines_of:
@@ -102,6 +103,7 @@ def _around(line: str, other: str, most: int, head: int) -> tuple[str, str]:
 
 
 def _experiment(difference: Diff, experiment: ExperimentDiff, cut: Shortening) -> Iterator[str]:
+    """The lines about a run or sweep that both archives have."""
     yield from [words.heading(experiment), *(f"  {line}" for line in words.unmatched_cases(difference, experiment))]
     yield from _ended(experiment, cut)
     yield from [f"  note: {note}" for note in experiment.notes]
@@ -115,7 +117,7 @@ def _experiment(difference: Diff, experiment: ExperimentDiff, cut: Shortening) -
 
 
 def _evidence(experiment: ExperimentDiff, cut: Shortening) -> list[str]:
-    """Lines on requirements over a share of cases whose evidence has changed."""
+    """Lines on requirements over a share of cases of which the two archives show another verdict."""
     both = [f"    {what}\n      {text}" for what, text in words.evidence_pairs(experiment)]
     lines = [line for block in cut.cut(both, SHOWN_EVIDENCE, "    ") for line in block.split("\n")]
     return [f"  {words.EVIDENCE}:", *lines] if lines else []
@@ -130,6 +132,7 @@ def _ended(experiment: ExperimentDiff, cut: Shortening) -> Iterator[str]:
 
 
 def _signals(signals: Sequence[SignalDiff]) -> list[str]:
+    """The table of signals and metrics that both archives have, a row each."""
     if not signals:
         return []
     rows = [words.signal_row(signal) for signal in signals]
@@ -153,6 +156,7 @@ def _paired(experiment: ExperimentDiff) -> list[str]:
 
 
 def _samples(experiment: ExperimentDiff) -> list[str]:
+    """The table of metrics as distributions of both archives."""
     if not experiment.samples:
         return []
     rows = [[head for head, _ in words.DISTRIBUTION_HEADS]]
@@ -163,6 +167,7 @@ def _samples(experiment: ExperimentDiff) -> list[str]:
 
 
 def _worst(difference: Diff, experiment: ExperimentDiff, cut: Shortening) -> list[str]:
+    """The lines about the cases that differ most, with commands that show them."""
     if not experiment.worst:
         return []
     out = []

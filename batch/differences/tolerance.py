@@ -163,6 +163,7 @@ def check(checked: Tolerances, known: Mapping[str, Sequence[str]], known_names: 
 
 
 def _in_si(word: str, size: float, unit: str, wanted: str = "") -> float:
+    """A tolerance in SI. wanted: the unit whose dimension it must have, if any. Raises Problem E360."""
     try:
         measure = parse_unit(unit or "1")
     except ValueError:

@@ -98,7 +98,7 @@ def requirement_lines(experiment: ExperimentDiff) -> list[str]:
 
 
 def evidence_pairs(experiment: ExperimentDiff) -> Iterator[tuple[str, str]]:
-    """Requirements over a share of cases whose evidence has changed, and the change."""
+    """Requirements over a share of cases of which the archives show different things, and the change, in words."""
     for change in experiment.evidence:
         before, now = texts_of(change.before), texts_of(change.now)
         named = (("", "verdict"), ("of all cases ", "of_all"), ("margin ", "margin"), ("in sigmas ", "sigmas"))
@@ -185,6 +185,7 @@ def endings(experiment: ExperimentDiff) -> list[Ending]:
 
 
 def _kind(ending: EndingDiff) -> str:
+    """How cases ended otherwise, in words: `fail that did not`."""
     if ending.before == ending.after:
         return f"{STATUS.get(ending.after, 'failed')} earlier or later"
     if ending.before == 0:
@@ -321,6 +322,7 @@ def step_error_note(experiment: ExperimentDiff) -> str:
 
 
 def _tolerance(signal: SignalDiff) -> str:
+    """A signal's tolerance in words, with the share of it that was used."""
     tolerance = signal.tolerance
     words = [f"{joint} {text}".lstrip() for joint, text in signal.as_written.items()]
     if len(words) > 1 or any(signal.as_written):
@@ -471,7 +473,7 @@ def _other_requirements(experiment: ExperimentDiff) -> list[str]:
 
 
 def _of_values(difference: Diff) -> str:
-    """The verdict on everything but requirements."""
+    """In how far two archives agree in signals and metrics, in words."""
     of_values = difference.of_values
     text = {
         IDENTICAL: "identical, to the bit",

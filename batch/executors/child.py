@@ -40,6 +40,8 @@ class Child:
     """One process, with one task at a time."""
 
     def __init__(self, folder: Path, threads: int, command: Sequence[str] = COMMAND) -> None:
+        """Start the process. folder: the campaign's; threads: for a task's cases. Raises OSError where it cannot be
+        started."""
         self.under_way = 0
         self._words = tempfile.TemporaryFile()  # noqa: SIM115 - what it says on stderr, while it lives
         try:
@@ -135,6 +137,7 @@ class Child:
 
 
 def _no_start(reason: OSError) -> str:
+    """The reason in words why a worker cannot be started, with what may help."""
     why = refusal_text(reason)
     if reason.errno in (errno.EMFILE, errno.ENFILE):
         return f"a worker cannot be started: {why}; {more_files()}"
@@ -200,6 +203,7 @@ class Crew:
             child.end()
 
     def _take(self) -> Child:
+        """A process that has no task, started where there is none."""
         with self._lock:
             if self._idle:
                 return self._idle.pop()
@@ -210,6 +214,7 @@ class Crew:
             return child
 
     def _discard(self, child: Child) -> None:
+        """End a process, and forget it."""
         with self._lock:
             mine = child in self._all
             if mine:

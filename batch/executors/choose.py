@@ -10,8 +10,11 @@ from met.diagnostic import Problem, error
 def choose(
     *, threads: int | None = None, processes: int | None = None, dask: object = None, timeout: float | None = None
 ) -> Executor:
-    """dask: the address of a scheduler, "local", or a `distributed.Client`. timeout: s that a case may go on without
-    any progress; it takes processes, for a thread cannot be stopped."""
+    """The executor of a campaign's tasks that these options ask for. Raises Problem E356 for two ways at once.
+
+    dask     the address of a scheduler, "local", or a `distributed.Client`
+    timeout  s that a case may go on without any progress; it takes processes, for a thread cannot be stopped
+    """
     for name, count in (("threads", threads), ("processes", processes)):
         if count is not None and count < 1:
             raise ValueError(f"{name}={count}: at least 1")

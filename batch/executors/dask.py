@@ -105,6 +105,7 @@ class Dask:
         return text if threads == workers else f"{text} with {threads} threads"
 
     def open(self, folder: Folder, sections: Mapping[int, CampaignSection], tell: Callable[[], None]) -> None:
+        """Connect to the cluster, and wait for a worker that sees the campaign's folder."""
         from batch.executors.dask_worker import dismiss
 
         self._folder, self._sections, self._tell = folder.path.resolve(), sections, tell
@@ -122,6 +123,7 @@ class Dask:
         self._running[self._on_loop(self._carry_out(task))] = task
 
     def wait(self) -> list[Outcome]:
+        """The outcomes of the next tasks that end. All tasks are broken where no worker has been seen for too long."""
         while self._running:
             ended, _ = wait(self._running, timeout=TELL_SECONDS, return_when=FIRST_COMPLETED)
             self._tell()
@@ -182,7 +184,7 @@ class Dask:
     # In the client's event loop
 
     async def _count(self) -> None:
-        """Keep count of the workers."""
+        """Keep the number of threads of each worker of the cluster up to date, for ever."""
         while True:
             try:
                 self._workers = await self._client.nthreads()

@@ -116,6 +116,7 @@ def _reached(address: str) -> Iterator[Any]:
 
 
 async def _greet(address: str) -> None:
+    """Connect to a scheduler and leave again, to see that it is there; raises what connecting raises."""
     from distributed.comm import connect
     from distributed.security import Security
 

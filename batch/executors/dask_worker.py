@@ -119,12 +119,14 @@ class WorkerChildren(WorkerPlugin):
         self._look = asyncio.create_task(self._go_when_idle())
 
     def transition(self, key: Any, start: str, finish: str, **_: Any) -> None:
+        """Stop all where Dask has given up a task that is under way here."""
         if key in self._at_work and finish in GIVEN_UP:
             self.over = True
             self._crew.stop()
             self._going = asyncio.create_task(self._go())
 
     async def teardown(self, worker: Worker) -> None:
+        """Stop the tasks of this worker, and end its child processes, as the worker closes."""
         self.over = True
         self._crew.stop()
         if self._look is not asyncio.current_task():

@@ -47,6 +47,7 @@ class Processes:
         self._running.add(self._pool.submit(self._crew.carry_out, task))
 
     def wait(self) -> list[Outcome]:
+        """The outcomes of the next tasks that end; none where none runs."""
         while self._running:
             ended, self._running = wait(self._running, timeout=TELL_SECONDS, return_when=FIRST_COMPLETED)
             self._tell()

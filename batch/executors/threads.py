@@ -38,6 +38,8 @@ class Threads:
         self._waiting.append(task)
 
     def wait(self) -> list[Outcome]:
+        """Compute the next task, and return the outcomes of those whose shards (files of results) are written
+        meanwhile."""
         if self._waiting:
             task = self._waiting.popleft()
             computed = tasks.compute(self._sections[task.section], task, threads=self.threads, progress=self._progress)
@@ -59,6 +61,7 @@ class Threads:
         self._tell()
 
     def _outcome(self, task: Task, done: Done, writing: Future[None]) -> Outcome:
+        """The outcome of a task whose shard (the file of its results) is written."""
         try:
             writing.result()
         except OSError as reason:

@@ -34,6 +34,7 @@ class Parent:
         threading.Thread(target=self._listen, daemon=True).start()
 
     def tell(self, **message: Any) -> None:
+        """Send the parent a message, a line of JSON; ends the process where nobody listens."""
         data = json.dumps(message).encode() + b"\n"
         try:
             while data:
@@ -82,9 +83,11 @@ def main(arguments: list[str]) -> None:
 
 
 def _slowly(parent: Parent) -> Any:
+    """A function that tells the parent the number of cases done, at most every `TELL_SECONDS`."""
     last = 0.0
 
     def tell(done: int) -> None:
+        """Tell the parent how many cases are done, unless it was told just now."""
         nonlocal last
         now = time.monotonic()
         if now - last > TELL_SECONDS:

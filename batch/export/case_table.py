@@ -69,6 +69,7 @@ class CaseTable:
             yield [self._column(field, group_of, positions) for field in self.fields]
 
     def _column(self, field: TableColumn, group_of: np.ndarray, positions: np.ndarray) -> list[object]:
+        """A column over the cases, each value from the case's group."""
         out: list[object] = [None] * len(positions)
         for number in np.unique(group_of).tolist():
             in_group = np.flatnonzero(group_of == number)
@@ -151,6 +152,7 @@ def value_of(field: TableColumn, group: ArchiveGroup, position: int) -> object:
 
 
 def _values(group: ArchiveGroup, field: TableColumn, positions: np.ndarray) -> list[object]:
+    """The values of a column of a table of cases, as Python's own types; None where the group lacks it."""
     if field.name == "run" and not field.variable:
         return [group.sweep or group.name] * len(positions)
     if not field.variable:
@@ -168,6 +170,7 @@ def _values(group: ArchiveGroup, field: TableColumn, positions: np.ndarray) -> l
 
 
 def _outcomes(group: ArchiveGroup, text: str, positions: np.ndarray) -> list[object]:
+    """The outcome of a requirement in each case, in words; None where the group lacks it."""
     texts = requirements.requirement_texts(group)
     if text not in texts:
         return [None] * len(positions)

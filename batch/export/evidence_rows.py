@@ -30,6 +30,7 @@ class EvidenceColumns:
         yield [[self._cell(field, row) for row in self.rows] for field in self.fields]
 
     def _cell(self, field: TableColumn, row: RequirementEvidence) -> object:
+        """A cell of the table of evidence, in the deck's unit or SI; None for an empty one."""
         value = getattr(row, field.name)
         if field.name == "unit":
             return row.unit if self.deck else row.si_unit
@@ -73,7 +74,8 @@ COLUMNS: tuple[tuple[str, str, str], ...] = (
 
 
 def evidence_columns(file: ArchiveFile, runs: Sequence[str], *, deck: bool = False) -> EvidenceColumns:
-    """The table of evidence of these runs and sweeps, of all if none is named. Raises Problem E325."""
+    """The table of evidence (what the cases show of each requirement) of these runs and sweeps, of all if none is
+    named. Raises Problem E325."""
     groups = groups_named(file, tuple(runs))
     rows = requirement_evidence(groups, file.path.name, several=len(by_run(file.groups)) > 1)
     fields = tuple(

@@ -158,6 +158,7 @@ class Channels:
         return self._channel(topic, *self._described[name, fields], metadata)
 
     def _channel(self, topic: str, name: str, data: bytes, metadata: dict[str, str]) -> int:
+        """The number of a topic's channel, made at the first call."""
         if topic in self._topics:
             return self._topics[topic]
         if (name, data) not in self._schemas:
@@ -209,6 +210,7 @@ def _messages(channels: Channels, arms: Sequence[PosedArm], number: int) -> Iter
 
 
 def _stream(channels: Channels, arm: PosedArm, name: str, columns: Sequence[SignalColumn]) -> SignalStream:
+    """The channel and the values [row, column] of a signal that an MCAP file gets."""
     values = arm.case.signal(name)[:, [column.place for column in columns]]
     parts = topics.fields(columns)
     units = {".".join(column.parts or ("value",)): column.unit for column in columns}
@@ -249,6 +251,7 @@ def _transforms(arm: PosedArm, base: str, times: Sequence[int], block: slice) ->
 
 
 def _log(case: ExportedCase, arm: PosedArm, line: LogLine) -> bytes:
+    """A line of a case's log as a message for Foxglove."""
     from foxglove_schemas_protobuf.Log_pb2 import Log
 
     name = arm.prefix.rstrip("/") or case.run_name
@@ -323,6 +326,7 @@ class Mcap(ExportFormat):
     def write_histories(
         self, file: ArchiveFile, cases: Sequence[ExportedCase], target: Path, request: ExportRequest
     ) -> WrittenExport:
+        """Write the histories of these cases, and, if asked for, a layout that shows them in Foxglove."""
         solid, *ghosts = arms(file, cases, named=request.named)
         if request.meshes:
             solid = replace(solid, meshes=arm_meshes(solid.experiment.structure, file.path.parent))

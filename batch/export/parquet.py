@@ -78,6 +78,7 @@ def write_rows(file: ArchiveFile, table: CaseTable | EvidenceColumns, output: Pa
 
 
 def _about(file: ArchiveFile, runs: Iterable[str]) -> dict[str, str]:
+    """The metadata of a Parquet file: the archive, the deck and the versions that it is from."""
     about = {
         "archive": file.path.name,
         "deck": file.deck,

@@ -114,7 +114,7 @@ def _columns(groups: Sequence[ArchiveGroup], signals: Sequence[str]) -> dict[str
 
 
 def _columns_of(group: ArchiveGroup, variable: Stored) -> list[SignalColumn]:
-    """All numbers of a signal."""
+    """A column for each number of a signal, by joint and component, with its channel's path and unit."""
     joints, components = group.joints(variable), group.components(variable)
     owners: list[tuple[str, ...]] = [(joint,) for joint in joints] or [()]
     inner: list[tuple[str, ...]] = [(component,) for component in components] or [()]

@@ -124,6 +124,7 @@ def positions(case: ExportedCase, joints: Sequence[str], *, free: bool = False) 
 
 
 def _position(case: ExportedCase, joint: str, signals: Mapping[str, Stored]) -> np.ndarray | None:
+    """q of a joint by row, rad or m, as a signal of its own or of all joints; None where neither was recorded."""
     alone = f"{joint}.{POSITION}"
     if alone in signals:
         return case.signal(alone)[:, 0].astype(np.float64)

@@ -161,6 +161,8 @@ class Fitter:
         priors: Mapping[str, Prior],
         progress: Callable[[int], None] = lambda _: None,
     ) -> None:
+        """Run the deck's own values, and take weights, sizes and differences from their residuals. Raises Problem
+        E480."""
         self.logs, self.start, self._progress = logs, start, progress
         self._mean = np.array([priors[path].mean if path in priors else 0.0 for path in logs.paths])
         self._pull = np.array([1.0 / priors[path].deviation if path in priors else 0.0 for path in logs.paths])
@@ -216,6 +218,7 @@ class Fitter:
     # Numbers of runs
 
     def _residuals(self, values: np.ndarray) -> np.ndarray:
+        """Residuals of runs with these values, [trial, number]; the runs are counted."""
         residuals = self.logs.residuals(values)
         self.runs += len(values) * len(self.logs.runs)
         self._progress(self.runs)
@@ -229,7 +232,7 @@ class Fitter:
         return np.asarray(0.5 * (squares + pulled))
 
     def _least_rms(self) -> np.ndarray:
-        """[signal]"""
+        """The least rms that residuals of each signal count with, a share of its largest measured number, [signal]."""
         signal = self.logs.signal_of
         largest = np.zeros(int(signal.max()) + 1)
         np.maximum.at(largest, signal, np.abs(self.logs.measured))
@@ -264,6 +267,7 @@ class Fitter:
         return size
 
     def _size_of(self, place: int) -> float:
+        """A change of a parameter that is 0, SI, large enough to change the weighted residuals."""
         values = np.tile(self.start, (2 * len(PROBED), 1))
         values[:, place] += [*PROBED, *(-probe for probe in PROBED)]
         change = np.sum((self.weights * (self._residuals(values) - self._first)) ** 2, axis=1)
@@ -465,6 +469,7 @@ def _memory(residuals: np.ndarray) -> float:
 
 
 def _fails(logs: LoggedRuns, start: np.ndarray) -> Problem:
+    """The error that a run fails with the deck's values (E480)."""
     for run in logs.runs:
         if not np.isfinite(run.computed(start[None, :])).all():
             message = f"`{run.deck_run.name}` fails with the deck's values: {run.cause(start)}"

@@ -250,6 +250,7 @@ class LoggedRun:
         return np.arange(schedule.rows) * schedule.record / schedule.base_hz
 
     def _with(self, own: np.ndarray) -> engine.Prepared:
+        """The run with these values of its parameters as cases, [case, path]."""
         cases = self.varied.experiment.cases
         coordinates = tuple(
             replace(coordinate, values=column) for coordinate, column in zip(cases.coordinates, own.T, strict=True)
@@ -257,7 +258,8 @@ class LoggedRun:
         return self._prepared.with_cases(replace(cases, count=len(own), coordinates=coordinates))
 
     def _histories(self, own: np.ndarray) -> np.ndarray:
-        """[case, row, column]; own: values of `used`, [case, path]"""
+        """The recorded numbers of a run for these values of its parameters, [case, row, column]. own: values of `used`,
+        [case, path]"""
         result = engine.run(self._with(own), record=True)
         signals = [recorded.name for recorded in self.deck_run.experiment.structure.record]
         return np.concatenate(

@@ -138,6 +138,7 @@ def _scalar_variable(variable: FmuVariable, reference: int) -> str:
 
 
 def _head(variable: FmuVariable, reference: int) -> dict[str, object]:
+    """The attributes of a variable of an FMU's description. reference: its number"""
     return {
         "name": variable.name,
         "valueReference": reference,
@@ -149,6 +150,7 @@ def _head(variable: FmuVariable, reference: int) -> dict[str, object]:
 
 
 def _type(variable: FmuVariable) -> dict[str, object]:
+    """The attributes of a real variable: units, bounds and start."""
     bounds = {"min": variable.low, "max": variable.high}
     return {
         "unit": unit_name(variable.unit),

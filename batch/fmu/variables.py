@@ -144,6 +144,7 @@ def _outputs(experiment: Experiment) -> Iterator[FmuVariable]:
 
 
 def _metrics(experiment: Experiment) -> Iterator[FmuVariable]:
+    """The metrics as variables of an FMU, as if the run ended now."""
     units = metric_units(experiment.structure)
     for use in experiment.structure.metrics:
         what = f"metric {use.model} of {use.of}, as if the run ended here"

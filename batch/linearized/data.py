@@ -91,8 +91,8 @@ def _word(name: str) -> str:
 
 
 def to_dataset(experiment: Experiment, gradients: MetricGradients) -> xarray.Dataset:
-    """`value` (case, metric) and `slope` (case, metric, number) in SI, with their units, and `why_not`, which is empty
-    where there is a slope."""
+    """An xarray.Dataset of `value` (case, metric) and `slope` (case, metric, number) in SI, with their units, and
+    `why_not`, which is empty where there is a slope."""
     import xarray
 
     why_not = np.full(gradients.slope.shape, "", dtype=object)
@@ -143,6 +143,7 @@ def write(linearized: Linearized, output: Path) -> None:
 
 
 def _about(linearized: Linearized) -> dict[str, Any]:
+    """The experiment, case, instant (s) and period (s) of linear answers, by name."""
     return {
         "experiment": linearized.experiment,
         "case": linearized.case,
@@ -152,6 +153,7 @@ def _about(linearized: Linearized) -> dict[str, Any]:
 
 
 def _npz(linearized: Linearized) -> bytes:
+    """The linear answers as the bytes of an .npz file."""
     buffer = io.BytesIO()
     several: dict[str, Any] = {name: matrix for name, (_, matrix) in arrays(linearized).items()}
     several |= {
@@ -163,6 +165,7 @@ def _npz(linearized: Linearized) -> bytes:
 
 
 def _hdf5(linearized: Linearized) -> bytes:
+    """The linear answers as the bytes of an HDF5 file, with dimension scales for xarray."""
     import h5py
 
     buffer = io.BytesIO()
@@ -179,6 +182,7 @@ def _hdf5(linearized: Linearized) -> bytes:
 
 
 def _csv(linearized: Linearized) -> bytes:
+    """The linear answers as the bytes of a CSV file, one matrix below the other."""
     text, names = io.StringIO(), axes(linearized)
     out = csv.writer(text, lineterminator="\n")
     for key, value in _about(linearized).items():

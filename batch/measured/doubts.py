@@ -84,6 +84,8 @@ def _column_doubt(name: str, pair: Pair, unit: str, now: float, white: bool) -> 
 
 
 def _exchanged(a: str, b: str, pairs: Mapping[str, Pair], residuals: Mapping[str, float]) -> list[str]:
+    """A doubt in words that two channels of a log are exchanged, where that leaves at most half of their residuals;
+    else none."""
     crossed = [Pair.of(pairs[x].instants, pairs[x].measured, pairs[y].course) for x, y in ((a, b), (b, a))]
     if any(len(pair.instants) < FEWEST for pair in crossed):
         return []

@@ -138,6 +138,8 @@ class _Log:
                         raise self.problem("has several cases, and a log is of one", helps)
 
     def message(self, message: Any) -> None:
+        """Take the numbers of a message, by channel. Raises Problem for one of an unknown channel, or too many
+        numbers."""
         number = message.channel_id
         if number not in self.channels:
             raise self.problem(f"has a message of channel {number}, which it does not describe")
@@ -173,6 +175,7 @@ class _Log:
         scales: dict[tuple[str, ...], tuple[str, float] | None] = {}
 
         def scale(path: tuple[str, ...]) -> tuple[str, float] | None:
+            """The channel of the run that a message's field is, and SI units of one of it; None where it is none."""
             if path not in scales:
                 names = (_own(signal, path), _of_joint(signal, path))
                 name = next((candidate for candidate in names if candidate in channels), None)
@@ -180,6 +183,7 @@ class _Log:
             return scales[path]
 
         def read(data: bytes) -> Iterator[tuple[str, float]]:
+            """The numbers of a message that channels of the run have, by channel, SI."""
             for path, value in _numbers(decoder(data)):
                 reading = scale(path)
                 if reading is not None:
@@ -228,7 +232,8 @@ class _Log:
                     yield f"{name}.{signal}", float(value) if number else math.nan
 
     def measured_signals(self) -> MeasuredSignals:
-        """All data read, at ascending times."""
+        """The signals of the log by channel, each with rising instants in s from the first message on; of several
+        numbers at one instant, the last."""
         unused = [
             visible(_short(topic)) for topic in dict.fromkeys(self.topics.values()) if topic not in self.shown_topics
         ]

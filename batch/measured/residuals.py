@@ -128,10 +128,10 @@ def compare(
     joints: Sequence[str],
     log: MeasuredSignals,
 ) -> Comparison:
-    """Compare a run with a log at the log's instants, as far as both last; between recorded rows, what was computed is
-    on straight lines.
+    """Compare a run with a log of measured signals at the log's instants, as far as both last; between recorded rows,
+    what was computed is on straight lines.
 
-    courses  what was computed, by channel; columns: those of `described_columns`; joints: the arm's
+    courses  computed signals over time, by channel; columns: those of `described_columns`; joints: the arm's
     """
     pairs = {name: Pair.of(*log.signals[name], courses[name]) for name in courses if name in log.signals}
     pairs = {name: pair for name, pair in pairs.items() if len(pair.instants)}
@@ -165,6 +165,7 @@ def compare(
 
 
 def _span(times: Sequence[np.ndarray]) -> tuple[float, float]:
+    """The first and the last of all these instants, s."""
     non_empty = [time for time in times if len(time)]
     return (
         (min(float(time[0]) for time in non_empty), max(float(time[-1]) for time in non_empty))

@@ -79,6 +79,7 @@ def _place(outputs: tuple[str, ...], name: str) -> int | None:
 
 
 def _inputs(experiment: Experiment) -> list[dict[str, Any]]:
+    """The inputs of a module for JSON: varied parameters with their unit, then repeat and seed of the noise."""
     cases = experiment.cases
     return [
         *(

@@ -190,6 +190,7 @@ class TreeAccessor(Accessor[xarray.DataTree]):
     """`data.met` of a DataTree: each question is put to each run, sweep or structure in it."""
 
     def _parts(self) -> dict[str, xarray.Dataset]:
+        """The datasets of the runs and sweeps in a DataTree, by name. Raises Problem E389 where it has none."""
         datasets = {
             node.path.removeprefix(self._data.path.rstrip("/")) or "/": node.to_dataset()
             for node in self._data.subtree

@@ -115,6 +115,7 @@ def _answered(data: xarray.Dataset) -> list[str]:
 
 
 def _cases(data: xarray.Dataset) -> str:
+    """The number of cases of a Dataset in words."""
     if CASE in data.dims:
         count, recorded = data.sizes[CASE], data.sizes.get(RECORDED, 0)
         return f"{count:,} case{'s' if count != 1 else ''}, {recorded:,} with a history"

@@ -91,7 +91,7 @@ def _frames(
 
 
 def _stacked(links: Sequence[np.ndarray], unknown: np.ndarray) -> np.ndarray:
-    """(..., link, component), not-a-number where a row is unknown."""
+    """Vectors of links as one array, [..., link, component], not-a-number where a row is unknown."""
     out = np.stack(links, axis=-2)
     out[unknown] = np.nan
     return out

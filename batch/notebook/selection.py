@@ -118,6 +118,8 @@ def _numbers(values: np.ndarray, wanted: Any, name: str, attributes: Mapping[str
 
 
 def _words(values: np.ndarray, wanted: Any, name: str) -> np.ndarray:
+    """True of each case that has one of the wanted words, [case]. Raises Problem E386 for a range, E387 for a word that
+    none has."""
     if isinstance(wanted, slice):
         raise Problem(error("E386", f"`{name}` is a word: it has no range", help="write a list of words"))
     out = np.zeros(len(values), bool)

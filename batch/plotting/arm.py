@@ -169,6 +169,7 @@ def hull(points: np.ndarray) -> np.ndarray:
     order = points[np.lexsort((points[:, 1], points[:, 0]))]
 
     def chain(rows: np.ndarray) -> list[np.ndarray]:
+        """The convex chain along one side of sorted points, without its last point."""
         out: list[np.ndarray] = []
         for p in rows:
             while len(out) > 1 and _side(out[-2], out[-1], p) <= 0.0:
@@ -267,6 +268,8 @@ def _recorded(group: ArchiveGroup, position: int) -> tuple[np.ndarray, dict[str,
 
 
 def _scene(archive: ArchiveFile, group: ArchiveGroup, position: int, recorded: Sequence[str]) -> ArmScene:
+    """The scene of a case's arm: its solids and their formulas. Raises Problem E370 where a channel that it needs was
+    not recorded."""
     plan = archive.plan(as_written=True)
     with reading(group.path):
         experiment = next(experiment for experiment in plan.experiments if experiment.name == group.name)
@@ -302,7 +305,7 @@ def _outputs(
     channels: dict[str, np.ndarray],
     time: np.ndarray,
 ) -> np.ndarray:
-    """Values of the scene's formulas, (row, output)."""
+    """Values of the scene's formulas at each row of a case's history, [row, output]."""
     values: dict[str, Any] = {v.path: float(group.at(v.name, [position])[0]) for v in group.role("coordinate")}
     values |= {name: channels[name] for name in scene.channels} | {TIME: time}
     for joint in scene.joints:
@@ -315,6 +318,8 @@ def _outputs(
 
 
 def _draw(axes: Any, pictured: Sequence[PicturedSolid], view: Viewpoint, pale: float, order: int) -> None:
+    """Draw solids from the far to the near. pale: how much lighter than their colours; order: among what else is
+    drawn"""
     from matplotlib.collections import PolyCollection
 
     listed = [(facet, _colour(solid)) for solid in pictured for facet in facets(solid, view)]
@@ -345,6 +350,7 @@ def _step(reach: float) -> float:
 
 
 def _floor(axes: Any, scene: ArmScene, view: Viewpoint, height: float) -> None:
+    """Draw the grid of a floor at a height, m."""
     from matplotlib.collections import LineCollection
 
     step = _step(scene.reach)
@@ -358,6 +364,7 @@ def _floor(axes: Any, scene: ArmScene, view: Viewpoint, height: float) -> None:
 
 
 def _shadow(axes: Any, pictured: Sequence[PicturedSolid], view: Viewpoint, height: float) -> None:
+    """Draw the shadow of solids on the floor at a height, m."""
     from matplotlib.collections import PolyCollection
 
     flat = []

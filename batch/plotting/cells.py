@@ -106,7 +106,7 @@ def _fill(ax: Any, x: MapSide, y: MapSide, which: np.ndarray, **style: Any) -> N
 
 
 def _corners(x: MapSide, y: MapSide, rows: np.ndarray) -> np.ndarray:
-    """[stretch, corner, 2] of the stretches of neighbouring cells in each row."""
+    """The corners of the stretches of neighbouring cells in each row, [stretch, corner, 2]."""
     steps = np.diff(np.pad(rows, ((0, 0), (1, 1))).astype(np.int8), axis=1)
     up, first = np.nonzero(steps > 0)
     end = np.nonzero(steps < 0)[1]

@@ -42,7 +42,7 @@ def draw(ax: Any, marks: Sequence[LimitMark], time: np.ndarray, sheet: PictureSh
 
 
 def write_limits(ax: Any, marks: Sequence[LimitMark], sheet: PictureSheet, columns: int) -> None:
-    """Names of the limits that no line is drawn of, right of what stands above the panel, where there is room."""
+    """Write the names of limits for which no line is drawn, right of what stands above the panel, if they fit there."""
     lines = {float(line.get_ydata()[0]) for line in ax.lines if line.get_label() == DOTS["label"]}
     inside = {mark.text for mark in marks if mark.time or mark.value in lines}
     high = ax.dataLim.intervaly[1]
@@ -77,6 +77,7 @@ def _along(ax: Any, value: float, text: str, sheet: PictureSheet, columns: int) 
 
 
 def _write(ax: Any, x: float, y: float, text: str, place: Any, sheet: PictureSheet, **style: Any) -> None:
+    """Write a text with a white rim, so that it can be read over lines."""
     from matplotlib.patheffects import withStroke
 
     ax.text(

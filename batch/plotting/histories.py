@@ -56,6 +56,8 @@ class Histories:
         sheet: PictureSheet,
         other: OtherGroup | None,
     ) -> None:
+        """signals: names, all for none; cases: names of recorded ones, all for none; other: another archive's group,
+        drawn below. Raises Problem where there are no histories."""
         self.archive, self.group, self.sheet, self.other = archive, group, sheet, other
         panels(group)  # refuses an archive without histories
         self.units = DeckUnits(archive, group)
@@ -118,6 +120,7 @@ class Histories:
         return figure
 
     def _below(self) -> str:
+        """The line below the picture: which cases it shows, and what was left out."""
         count = len(self.positions)
         if self.single:
             below = case_text(self.group, self.positions[0]) if self.group.attributes["cases_in_table"] > 1 else ""
@@ -137,6 +140,8 @@ class Histories:
         )
 
     def _cell(self, ax: Any, cell: Cell, by_joint: bool, columns: int) -> None:
+        """Draw one cell of the picture: its lines, another archive's under them, and the commands and marks over
+        them."""
         panel = cell.panel
         above = self._above(cell) if self.single else {}
         for line in cell.lines:

@@ -213,7 +213,7 @@ def head(ax: Any, text: str, sheet: PictureSheet, columns: int, colour: str = IN
 
 
 def _grow(figure: Any, sheet: PictureSheet, lines: float) -> None:
-    """Make room on paper for further lines, unless the height is given."""
+    """Enlarge a picture on paper by further lines, unless its height is given."""
     if sheet.paper and sheet.height is None:
         figure.set_figheight(figure.get_figheight() + lines * LINE * sheet.small / 72)
 

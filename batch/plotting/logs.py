@@ -32,8 +32,10 @@ class MeasuredPanel:
 def panels(
     log: MeasuredSignals, units: Mapping[str, str], courses: Mapping[str, Mapping[str, ComputedChannel]]
 ) -> list[MeasuredPanel]:
-    """The channels of a log, at instants at which there is a computed number. courses: by what computed them, those of
-    channels; units: SI, by channel"""
+    """The channels of a log, one panel each, at the instants for which there is a computed number.
+
+    courses  the computed signals over time, by what computed them and by channel;  units: SI, by channel
+    """
     drawable_panels = []
     for channel, (instants, measured) in log.signals.items():
         ways = {name: course[channel] for name, course in courses.items() if channel in course}

@@ -116,6 +116,7 @@ def description(map_layout: MapLayout, metrics: Sequence[MapMetric], third: Case
 
 
 def _stands(metrics: Sequence[MapMetric], map_layout: MapLayout) -> str:
+    """Which case stands for a cell that holds several, in words."""
     if map_layout.other is not None:
         return "the one that differs most"
     judged = {bool(metric.column.limits) for metric in metrics}
@@ -153,6 +154,7 @@ class ColourScale:
 
 
 def _tones(metric: MapMetric, map_layout: MapLayout, values: np.ndarray) -> ColourScale:
+    """The colours of a metric's values, [case], logarithmic where they span factors."""
     from matplotlib.colors import LogNorm, Normalize
 
     limits = [limit.value for limit in metric.column.limits] if map_layout.other is None else []
@@ -250,6 +252,8 @@ def _maps(
 
 
 def _striped(metric: MapMetric, map_layout: MapLayout) -> list[tuple[np.ndarray, str]]:
+    """The cases that are drawn with stripes or dots, [case], by pattern: those that miss a requirement, or have
+    changed."""
     if map_layout.other is None or metric.theirs_missed is None:
         return [(metric.missed, STRIPES)]
     both = metric.both

@@ -79,6 +79,7 @@ def _place(names: Sequence[str], name: str) -> int:
 
 
 def _both(pool: Pool, others: Mapping[int, OtherGroup]) -> np.ndarray | bool:
+    """True of each case that the other archive has too, [case]."""
     if not others:
         return True
     out = np.zeros(pool.count, bool)

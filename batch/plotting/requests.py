@@ -157,6 +157,7 @@ def _not_varied(archive: ArchiveFile, pool: Pool, name: str, known: Sequence[str
 
 
 def _is_parameter(archive: ArchiveFile, pool: Pool, name: str) -> bool:
+    """True if a name is a parameter of one of the experiments."""
     try:
         experiments = archive.plan(as_written=True).experiments
     except Problem:
@@ -193,8 +194,12 @@ def draw(
     others: Mapping[int, OtherGroup],
     other: ArchiveFile | None,
 ) -> Any:
-    """The figure. names: of metrics, all for none; parameters: what they are drawn over, none: as is best. others: by
-    number of a group of the pool that of the other archive. Raises Problem E327, E390, E393."""
+    """The figure of a run's or sweep's metrics over its parameters. Raises Problem E327, E390, E393.
+
+    pool        the cases of the run or sweep, over all its structures
+    names       of metrics, none: all;  parameters: what they are drawn over, none: as is best
+    others      another archive's cases, by number of a group of the pool
+    """
     axes_columns = map_axes(archive, pool, parameters)
     if not pool.metrics():
         helps = "`--histories all` keeps histories; a `metric` in the deck gives a number a case"
@@ -239,7 +244,7 @@ def _points(
     sheet: PictureSheet,
     files: tuple[str, str] | None,
 ) -> Any:
-    """Draw a panel for each metric."""
+    """The figure of metrics as points: a panel for each metric, over the parameter `x`, in the colours of `by`."""
     x = x or CaseColumn("case", "case", "", "case", pool.cases.astype(np.float64))
     figure, axes = layout.figure(sheet, 1, [1.0] * len(metrics))
     mapped = None

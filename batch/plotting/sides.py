@@ -128,6 +128,7 @@ def write_log(axis: Any, map_side: MapSide, inches: float, sheet: PictureSheet, 
 
 
 def _even_numbers(low: float, high: float, inches: float, sheet: PictureSheet) -> list[float]:
+    """Round numbers between two ends, as many as fit on an axis of this length, inches."""
     from matplotlib.ticker import MaxNLocator
 
     wide = _wide([number_text(low), number_text(high)], sheet) + APART

@@ -86,6 +86,7 @@ def deck_of(
 
 
 def _run_of(deck: str | Path, sweep: str, defines: Sequence[str], include_dirs: Sequence[str | Path]) -> str:
+    """The run that a sweep of a deck is of. Raises Problem E479."""
     tree = read(Path(deck), tuple(map(Path, include_dirs)), tuple(defines))
     sweep_definition = Definitions(tree, Complaints()).of_kind("sweep").get(sweep)
     run_word = sweep_definition.group.of if sweep_definition is not None else None
@@ -153,6 +154,7 @@ def limits(run: VariedRun) -> list[dict[str, Any]]:
     ends = np.where(refused, good, far)
 
     def refusal(n: int) -> str:
+        """The reason why a value beyond the limit number `n` is refused, in words; empty where it is not."""
         if not refused[n]:
             return f"it is more than {FAR:g} times as far as the deck's"
         path = paths[n % count]

@@ -264,7 +264,7 @@ def page_text(
     before: Sequence[str] = (),
     style: str = "",
 ) -> str:
-    """The whole file.
+    """The whole HTML file of a page that runs a run's cases.
 
     head    the texts at its top, as `head_of` has them
     start   texts of scripts, after all others: what gives the page its data

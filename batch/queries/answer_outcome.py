@@ -152,6 +152,7 @@ def _of_tuning(answer: SearchAnswer, judged: tuple[AnswerRequirement, ...]) -> s
 
 
 def _of_worst(answer: SearchAnswer, judged: tuple[AnswerRequirement, ...]) -> str:
+    """A sentence on the worst case that a search found. judged: requirements"""
     worst = f"The worst case found, #{answer.position},"
     if answer.best.failed:
         return f"{worst} fails"

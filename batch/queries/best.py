@@ -91,6 +91,7 @@ class Designs:
     """
 
     def __init__(self, pool: Pool, over: Sequence[str] = (), choose: Sequence[str] = ()) -> None:
+        """Number the designs of the cases: equal values of what is chosen are one design. Raises Problem E394, E395."""
         self.pool = pool
         varied = varied_columns(pool)
         check_varied(pool, (*over, *choose))
@@ -133,7 +134,7 @@ class Designs:
 
     @cached_property
     def shares(self) -> np.ndarray:
-        """[demand] the share of a design's cases that must meet it."""
+        """The share of a design's cases that must meet each demand, [demand]."""
         known = {
             group_requirement.text: group_requirement.share
             for group in self.pool.groups
@@ -143,7 +144,7 @@ class Designs:
 
     @cached_property
     def met(self) -> np.ndarray:
-        """[design, demand] the share of its cases that meet it."""
+        """The share of each design's cases that meet each demand, [design, demand]."""
         holds = self.pool.outcomes == 1 if self.pool.requirements else (self.pool.status == DONE)[:, None]
         return self._share(holds)
 
@@ -176,8 +177,8 @@ class Designs:
 
     @cached_property
     def room(self) -> np.ndarray:
-        """[design] the smallest distance of its cases from the limit of a demand on all cases, as a share of the limit;
-        infinite where there is none."""
+        """The smallest distance of a design's cases from the limit of a demand on all cases, as a share of the limit,
+        [design]; infinite where there is none."""
         far = np.full(self.pool.count, -np.inf)
         for group_number, group in enumerate(self.pool.groups):
             in_group = self.pool.group_of == group_number
@@ -189,7 +190,7 @@ class Designs:
         return -self.worst(far, largest=True)
 
     def worst(self, values: np.ndarray, *, largest: bool) -> np.ndarray:
-        """[design] the largest, or smallest, value of its cases; not-a-number where a case has none."""
+        """The largest, or smallest, value of each design's cases, [design]; not-a-number where a case has none."""
         out = np.full(self.count, -np.inf if largest else np.inf)
         with np.errstate(invalid="ignore"):
             (np.maximum if largest else np.minimum).at(out, self.of_case, values)
@@ -210,8 +211,8 @@ class Designs:
 
     @cached_property
     def steps(self) -> np.ndarray | None:
-        """[design] the number of grid steps to the border, in any direction: 0 where it is not good. None where the
-        designs do not form a grid."""
+        """The number of grid steps from each design to the border, in any direction, [design]: 0 where it is not good.
+        None where the designs do not form a grid."""
         from scipy.ndimage import distance_transform_cdt
 
         grid = self._grid
@@ -290,7 +291,8 @@ class Designs:
         return good[np.lexsort(keys[::-1])]
 
     def _wanted(self, goal: Goal) -> np.ndarray:
-        """[design] a goal in the worst of its cases, as a number to minimise; designs without one come last."""
+        """A goal in the worst of each design's cases, as a number to minimise, [design]; designs without one come
+        last."""
         worst_values = self.worst(-goal.values if goal.largest else goal.values, largest=True)
         return np.where(np.isnan(worst_values), np.inf, worst_values)
 

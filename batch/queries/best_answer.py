@@ -71,6 +71,7 @@ class BestAnswer:
         judged: Mapping[int, JudgedDesign] | None = None,
         least_margin: float = 0.0,
     ) -> None:
+        """Order the designs by the goals, those first that keep the least margin of stability."""
         self.designs, self.goals, self.front = designs, tuple(goals), tuple(front)
         self.deck, self.name, self.seed = deck, name, seed
         self.defines, self.overrides, self.remarks = tuple(defines), tuple(overrides), tuple(remarks)
@@ -132,6 +133,7 @@ class BestAnswer:
         return out
 
     def _use(self, best: int, width: int) -> list[str]:
+        """The lines about the design to use: why, how far each value may go, the table, and how to confirm it."""
         out = [self.headline, *_wrapped(self.why, width), *wrapped(*self.stability())]
         if stretches := self.stretches():
             out += ["", "how far each may go by itself:", *columns(stretches)]
@@ -247,6 +249,7 @@ class BestAnswer:
         return ", ".join(faults)
 
     def _trade_off(self) -> list[str]:
+        """The lines about designs of which none is better in one goal and as good in the others."""
         front = self.designs.front(self.front)
         some = front[np.unique(np.linspace(0, len(front) - 1, min(len(front), MOST_ON_FRONT)).astype(int))]
         names = " against ".join(goal.text for goal in self.front)
@@ -380,6 +383,8 @@ class BestAnswer:
         return out
 
     def _as_row(self, row: BestRow) -> dict[str, Any]:
+        """A row of the answer for JSON: the design's chosen values, its worst metrics, room to limits, and
+        stability."""
         designs = self.designs
         return {
             "why": row.label,
@@ -400,6 +405,7 @@ def _least(goal: Goal) -> str:
 
 
 def _values(column: CaseColumn, places: Iterable[int]) -> list[str]:
+    """The values of a column for these cases, in words."""
     values = [float(column.values[place]) for place in places]
     texts = [column.words[int(value)] if column.role == "choice" and value == value else "" for value in values]
     numbers = texts if column.role == "choice" else number_texts(values)

@@ -137,6 +137,7 @@ MOST_STANDING_OUT = 100
 
 
 def _title(group: ArchiveGroup, most: int | None, by: CaseOrder | None) -> str:
+    """The title of the list of cases, by the order that it has."""
     if (order := ordering.order_of([group], by)) is not None:
         return order.title
     outcomes = requirements.outcomes(group)
@@ -225,6 +226,7 @@ def varied_lines(archive: ArchiveFile, group: ArchiveGroup, position: int) -> li
 
 
 def _outcome(status: int, outcomes: np.ndarray) -> str:
+    """The outcome of a case in a word. outcomes: of its requirements, 1, 0 or -1"""
     if status != 0:
         return STATUS.get(int(status), "failed")
     if not len(outcomes):

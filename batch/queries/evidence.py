@@ -86,8 +86,9 @@ class EvidenceRow:
 
 
 def evidence(group: ArchiveGroup) -> list[EvidenceRow]:
-    """The rows of an experiment's requirements over a share of cases, at each of its design points; none, without
-    reading values, where it has no such requirement, or is a search, whose cases an optimiser chose."""
+    """The rows of evidence, what the cases show of a requirement over a share of them: one for each requirement and
+    design point of an experiment. None, without reading values, where it has no such requirement, or is a search, whose
+    cases an optimiser chose."""
     if is_search(group):
         return []
     return evidence_for(
@@ -101,7 +102,8 @@ def evidence(group: ArchiveGroup) -> list[EvidenceRow]:
 
 
 def evidence_for(group: ArchiveGroup, judged_requirements: Sequence[GroupRequirement]) -> list[EvidenceRow]:
-    """The rows of these requirements: one for each design point, and a single one where every case has to meet it."""
+    """The rows of evidence for these requirements, what the cases show of each: one for each design point, and a single
+    one where every case has to meet it."""
     if not judged_requirements:
         return []
     if (answer := SearchAnswer.of(group)) is not None:

@@ -72,6 +72,7 @@ class CaseExpressions:
         return figure.margin if figure is not None else metric is not None and metric.margin
 
     def _find(self, name: Name) -> Value:
+        """The values of a metric or varied parameter over all cases. Raises Problem D065 for an unknown name."""
         variable = self._variables.get(name.text)
         if variable is None:
             known = [*self._variables, *(column.label for column in self.pool.columns if column.role == "choice")]

@@ -37,6 +37,7 @@ def last_runs(deck: str) -> dict[str, LastRun]:
 
 
 def _newest(deck: Path) -> list[Path]:
+    """The newest archives beside a deck whose names begin as the deck's."""
     try:
         archives = [path for path in deck.parent.iterdir() if path.suffix == ".h5" and path.name.startswith(deck.stem)]
         return sorted(archives, key=lambda path: -path.stat().st_mtime)[:MOST_ARCHIVES]
@@ -45,6 +46,8 @@ def _newest(deck: Path) -> list[Path]:
 
 
 def _last_run(archive: Path, group: ArchiveGroup, seconds: float | None) -> LastRun:
+    """The last run of a run or sweep: for each requirement the number of cases that met it, missed it, and left it
+    open."""
     counts = {}
     if group.summary is None:
         met = outcomes(group)
@@ -67,6 +70,7 @@ def _seconds(archive: Path) -> dict[str, float]:
 
 
 def _numbers(timings: Any) -> Iterator[tuple[str, float]]:
+    """The names of experiments in a sidecar with the seconds that they took."""
     every = timings.get("experiments") if isinstance(timings, dict) else None
     for entry in every if isinstance(every, list) else ():
         if isinstance(entry, dict) and isinstance(entry.get("experiment"), str):

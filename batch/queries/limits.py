@@ -42,6 +42,7 @@ def limits_of(experiment: Experiment, panel: Panel, line: int) -> tuple[LimitMar
 
 
 def _required(experiment: Experiment, channel: str, panel: Panel) -> Iterator[LimitMark]:
+    """The limits that requirements set to a channel, in the panel's unit."""
     watched = {metric.name: metric for metric in experiment.structure.metrics}
     for requirement in experiment.requirements:
         metric = watched.get(requirement.metric)
@@ -54,6 +55,7 @@ def _required(experiment: Experiment, channel: str, panel: Panel) -> Iterator[Li
 
 
 def _stops(experiment: Experiment, joint: str, panel: Panel) -> Iterator[LimitMark]:
+    """The ends of a joint's stops as limits of its position, in the panel's unit."""
     if not joint or panel.variable.rpartition(".")[2] != "q":
         return
     for use in experiment.structure.environment:
@@ -65,6 +67,7 @@ def _stops(experiment: Experiment, joint: str, panel: Panel) -> Iterator[LimitMa
 
 
 def _servo(experiment: Experiment, channel: str, panel: Panel) -> Iterator[LimitMark]:
+    """The limits of a servo, or of a bed's motor, for a channel of it, in the panel's unit."""
     owner, _, member = channel.rpartition(".")
     if member in LIMITED and owner.rpartition(".")[2] in ("servo", "bed"):
         value = _number(experiment, f"{owner}.{LIMITED[member]}")

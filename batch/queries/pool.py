@@ -144,7 +144,8 @@ class Pool:
 
     @cached_property
     def outcomes(self) -> np.ndarray:
-        """(case, requirement): 1 met, 0 missed, -1 unknown; 1 where a structure does not have the requirement."""
+        """The outcome of each requirement in each case, [case, requirement]: 1 met, 0 missed, -1 unknown; 1 where a
+        structure does not have the requirement."""
         out = np.ones((self.count, len(self.requirements)), np.int8)
         for number, group in enumerate(self.groups):
             in_group = self.group_of == number
@@ -155,13 +156,13 @@ class Pool:
         return out
 
     def missed(self, column: CaseColumn) -> np.ndarray:
-        """[case] whether a metric misses one of its requirements."""
+        """True of each case in which a metric misses one of its requirements, [case]."""
         places = [self.requirements.index(limit.text) for limit in column.limits]
         return np.asarray((self.outcomes[:, places] == 0).any(axis=1))
 
     @cached_property
     def ended(self) -> np.ndarray:
-        """[case] its outcome, as its place in `ENDED`."""
+        """The outcome of each case, as its place in `ENDED`, [case]."""
         out = np.full(self.count, ENDED.index("met" if self.requirements else "done"))
         out[(self.outcomes < 0).any(axis=1)] = ENDED.index("unknown")
         out[(self.outcomes == 0).any(axis=1)] = ENDED.index("missed")
@@ -286,7 +287,7 @@ def page_number(value: float) -> str:
 
 
 def pools(groups: Sequence[ArchiveGroup]) -> list[Pool]:
-    """A pool for each run or sweep among the groups."""
+    """For each run or sweep among the groups, its cases over all its structures."""
     return [Pool(name, own) for name, own in by_run(groups).items()]
 
 

@@ -61,7 +61,7 @@ def _number(value: float) -> float | None:
 
 
 def outcomes(group: ArchiveGroup, positions: np.ndarray | None = None) -> np.ndarray:
-    """(case, requirement): 1 met, 0 missed, -1 unknown; for all cases or for some."""
+    """The outcome of each requirement in all cases or in some, [case, requirement]: 1 met, 0 missed, -1 unknown."""
     if "met" not in group.variables:
         return np.zeros((group.count if positions is None else len(positions), 0), np.int8)
     return group.values("met") if positions is None else group.at("met", positions)

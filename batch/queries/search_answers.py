@@ -173,8 +173,8 @@ class SearchAnswer:
 
     @cached_property
     def starts(self) -> list[float]:
-        """The goal that each start of a tuning came to with all plants, SI, not-a-number where none did; none where the
-        archive was made before MET kept its starts."""
+        """The goal that each start of a tuning came to on all plants (the cases that it judges candidates on), SI,
+        not-a-number where none did; none where the archive was made before MET kept its starts."""
         goal = self._judged_cases[2][self.search.metric]
         return [float(goal[start.best]) if start.best >= 0 else math.nan for start in self.search.starts]
 
@@ -228,9 +228,9 @@ class SearchAnswer:
 
     @cached_property
     def _worse(self) -> tuple[int, float] | None:
-        """The case, and the distance as of `nearest`, of the nearest candidate whose goal is worse than the answer's in
-        some plant, so that it is in the worst; None where there is none, or where the answer's goal is 0 but for
-        rounding."""
+        """The nearest candidate whose goal is worse than the answer's on some plant (a case that candidates are judged
+        on): its case, and its distance as of `nearest`. None where there is none, or where the answer's goal is 0 but
+        for rounding."""
         table, done, metrics, _ = self._judged_cases
         goals, value = metrics[self.search.metric], self.best.value
         loss = value - goals if self.search.largest else goals - value
@@ -245,7 +245,7 @@ class SearchAnswer:
 
     @property
     def _tried(self) -> str:
-        """The number of candidates that were tried, with all plants or with some."""
+        """The number of candidates that were run, on all plants (the cases that they are judged on) or on some."""
         count = len(np.unique(self._judged_cases[0][:, : len(self.search.parameters)], axis=0))
         return f"{count:,} candidate{'s' * (count != 1)} tried"
 
@@ -302,6 +302,7 @@ class SearchAnswer:
         return out
 
     def _worst(self) -> list[str]:
+        """The lines about the worst case that a search found, with the chosen parameters and the metric's value."""
         best, search = self.best, self.search
         case, worst = f"case #{self.position} with {self._chosen}", f"the worst of search `{self.group.name}`"
         if best.failed:
@@ -391,6 +392,7 @@ def progress(answer_so_far: Answer, experiment: Experiment) -> str:
 
 
 def _binding(best: Answer) -> str:
+    """What the best candidate misses, or is nearest to missing, in words."""
     if best.missed:
         return f", misses {best.missed[0]}"
     near: Sequence[str] = [room.text for room in best.rooms[:NEAREST] if best.search.kind == "tune"]

@@ -31,7 +31,8 @@ class CaseSelection:
         return not (self.where or self.met or self.over)
 
     def places(self, pool: Pool) -> np.ndarray:
-        """Places of these cases, in the pool's order. Raises Problem for an invalid condition, or an unknown path."""
+        """Places of the selected cases in a pool (the cases of a run or sweep over all its structures), in its order.
+        Raises Problem for an invalid condition, or an unknown path."""
         keep = np.ones(pool.count, bool)
         if self.where:
             keep &= CaseExpressions(pool).holds(self.where)

@@ -123,7 +123,7 @@ def stable_at(margin: Margin, spans: bool) -> str:
 
 
 def verdict(margin: Margin, none: str = "NONE") -> str:
-    """The margin in words; the text begins with `none` where there is no margin."""
+    """The margin of a motor bed's law in words; the text begins with `none` where there is no margin."""
     if margin.together != margin.together:
         return f"{none}: r is no number"
     if not margin.stable:

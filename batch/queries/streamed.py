@@ -79,6 +79,8 @@ def _points(group: ArchiveGroup, piece: slice, chosen: list[Stored], points: Poi
 
 
 def _block(group: ArchiveGroup, piece: slice, chosen: list[Stored], points: PointNumbers) -> CaseBlock:
+    """The outcomes and metrics of a stretch of a group's rows, with the design point of each."""
+
     def read(name: str) -> np.ndarray:
         return group.stretch(name, piece.start, piece.stop)
 

@@ -322,6 +322,7 @@ def _doubts(group: ArchiveGroup, position: int | None) -> tuple[FailureGroup, ..
 
 
 def _metric(variable: Stored, values: np.ndarray) -> MetricSummary:
+    """A metric's spread over the cases, with its units."""
     moments, attributes = spread(values), variable.attributes
     return MetricSummary(
         **asdict(moments),

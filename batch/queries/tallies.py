@@ -55,6 +55,7 @@ class PointNumbers:
         return np.asarray(numbers[index.ravel()])
 
     def _number(self, values: tuple[float, ...]) -> int:
+        """The number of a design point. Raises TooManyPoints."""
         if values not in self._numbers:
             if len(self.values) == MOST_POINTS:
                 raise TooManyPoints
@@ -179,7 +180,7 @@ class CaseTallies:
         self.limited = 0
 
     def add(self, block: CaseBlock) -> None:
-        """Add the next cases."""
+        """Add the next cases to the tallies of metrics, requirements and causes of failure."""
         self.limited += block.limited
         done = block.status == DONE
         for name, tally in self.metrics.items():

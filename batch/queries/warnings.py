@@ -106,6 +106,7 @@ def undecided_warnings(group: ArchiveGroup, experiment: Experiment | None = None
 
 
 def _nothing(experiment: Experiment | None, requirements: list[GroupRequirement]) -> list[Diagnostic]:
+    """A warning about requirements on a settling time that are met because the signal never left its band (D341)."""
     if not requirements:
         return []
     first, *others = requirements
@@ -123,6 +124,8 @@ def _nothing(experiment: Experiment | None, requirements: list[GroupRequirement]
 def _unseen(
     group: ArchiveGroup, experiment: Experiment | None, duration: float, undecided: list[tuple[GroupRequirement, int]]
 ) -> list[Diagnostic]:
+    """A warning about requirements whose limit lies beyond the run's end (D341). undecided: each with the number of its
+    cases"""
     if not undecided:
         return []
     (first, unseen), *others = undecided
@@ -143,6 +146,7 @@ def _diagnostics(
     message: str,
     helps: list[str],
 ) -> list[Diagnostic]:
+    """One warning (D341) about a requirement, with the others that it is true of."""
     if others:
         helps.append(f"the same of {', '.join(f'`require {other.text}`' for other in others)}")
     place = None if experiment is None else experiment.requirements[first.place].place
@@ -193,8 +197,8 @@ def idle_warnings(group: ArchiveGroup, experiment: Experiment | None = None) -> 
 
 
 def _idle(axes: dict[str, np.ndarray], metrics: list[np.ndarray]) -> list[str]:
-    """The axes that change no metric between cases that differ in them alone. Parameters that vary together are one
-    axis. Where no cases differ in one axis alone, as in a sample, all axes if no metric changes at all."""
+    """The axes of a sweep that change no metric between cases that differ in them alone. Parameters that vary together
+    are one axis. Where no cases differ in one axis alone, as in a sample, all axes if no metric changes at all."""
     codes = {path: np.unique(values, return_inverse=True)[1] for path, values in axes.items()}
     together: dict[bytes, list[str]] = {}
     for path, code in codes.items():
@@ -224,7 +228,8 @@ def _numbered(codes: Iterable[np.ndarray], count: int) -> np.ndarray:
 
 
 def _same(plants: np.ndarray, values: Iterable[np.ndarray]) -> bool:
-    """True where cases with the same number in `plants` have the same values, but for rounding."""
+    """True where all cases with the same number in `plants`, [case], have the same values, but for rounding: what
+    numbers the cases apart has no effect."""
     _, first, number = np.unique(plants, return_index=True, return_inverse=True)
     return all(np.isclose(value[first[number]], value, rtol=ROUNDING, atol=0.0).all() for value in values)
 

@@ -72,6 +72,8 @@ class Simulation:
         include_dirs: Iterable[str | os.PathLike[str]] = (),
         set: Mapping[str, object] | Iterable[str] = (),
     ) -> None:
+        """Read the deck and find the run. Raises TypeError unless either a path or a text is given, and Problem for a
+        mistake."""
         if (path is None) == (text is None):
             raise TypeError("a deck is given by its path or by its text")
         self._deck_run = given_run(
@@ -267,6 +269,7 @@ def _cases(template: Cases, table: Mapping[str, np.ndarray], count: int, repeat:
 
 
 def _no_number(path: str, value: Any) -> Problem:
+    """The error for a path that is a word and no number (E434)."""
     helps = f'`batch.Simulation(..., set={{"{path}": {str(value)!r}}})`'
     return Problem(
         error("E434", f"`{path}` is a word, not a number", help=f"what decides the program is set once: {helps}")

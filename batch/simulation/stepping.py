@@ -108,6 +108,8 @@ class SteppedRun:
     """
 
     def __init__(self, program: SteppedProgram, table: Mapping[str, np.ndarray], repeat: int) -> None:
+        """Begin the case and observe it at tick 0. table: its varied values by path, SI, one each; repeat: of its
+        noise"""
         self._program, self._prepared = program, program.prepared
         experiment = self._prepared.experiment
         self.joints, self.period = program.joints, program.divisor / experiment.structure.schedule.base_hz

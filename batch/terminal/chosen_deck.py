@@ -138,6 +138,7 @@ def fitted_deck(
     after, others, remarks = before, dict[str, None](), list[str]()
 
     def written(value: WrittenValue, remark: str) -> DeckWithValues:
+        """The deck with one fitted value written into its text. Raises Problem where the text has no place for it."""
         return with_values(
             after,
             [value],

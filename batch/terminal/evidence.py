@@ -16,7 +16,8 @@ MOST_POINTS = 12
 
 
 def evidence_lines(rows: Sequence[EvidenceRow]) -> Iterator[str]:
-    """Lines for each design point: the verdict, its grounds, and the missing cases."""
+    """Lines on what the cases show of a requirement, for each design point: the verdict, its grounds, and the missing
+    cases."""
     listed = list(rows) if len(rows) <= MOST_POINTS else sorted(rows, key=lambda row: row.ok)[:MOST_POINTS]
     wide = max((len(row.verdict) for row in listed), default=0)
     heads = [", ".join(f"{path} = {text}" for path, text in row.chosen.items()) for row in listed]
@@ -68,8 +69,8 @@ OF_VALUES = (("limit", "limit"), ("worst", "worst"), ("margin", "margin"), ("in 
 
 
 def evidence_table_lines(rows: Sequence[RequirementEvidence], width: int) -> list[str]:
-    """The table of evidence: the requirements, numbered; the evidence for each, and the distance to its limit; the
-    command that runs the worst case again; notes."""
+    """The table of evidence in lines: the requirements, numbered; what the cases show of each, and the distance to its
+    limit; the command that runs the worst case again; notes."""
     if not rows:
         return ["nothing is required"]
     required = list(dict.fromkeys(row.requirement for row in rows))

@@ -263,6 +263,7 @@ def identifiable_data(question: FitQuestion, known: Known, promised: Sequence[Pr
 
 
 def _comparisons(runs: Sequence[Any], pairs: Any) -> list[dict[str, Any]]:
+    """The residuals of each log before and after the fit, for JSON."""
     return [
         {
             "run": run.deck_run.name,
@@ -299,6 +300,7 @@ def _together(question: FitQuestion, known: Known) -> Iterator[str]:
 
 
 def _residual_lines(title: str, before: Comparison, after: Comparison, doubts: Sequence[str]) -> Iterator[str]:
+    """The table of a log's residuals before and after the fit, a row for each channel."""
     earlier = {residual.channel: residual for residual in before.residuals}
     rows = [[title, "before", "after", "", "of spread", "", "what is left follows"]]
     for residual in after.residuals:

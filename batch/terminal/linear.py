@@ -54,6 +54,7 @@ _HEAD = ("Hz", "damping", "by e in", "who takes part")
 
 
 def _row(linearized: Linearized, pole: Pole) -> tuple[str, ...]:
+    """A row of the table of modes: frequency (Hz), damping, time to decay, and the states that take part."""
     if math.isinf(pole.hz):
         return "-", "-", "at once", _parts(linearized, pole)
     stays = pole.stays(linearized.seconds)
@@ -83,6 +84,7 @@ def _of_joint(state: str, joint: str) -> str:
 
 
 def _table(head: Sequence[tuple[str, ...]], rows: Sequence[tuple[str, ...]]) -> Iterator[str]:
+    """The table of modes, the first `MOST_POLES` of them, in lines."""
     width = len(head[0])
     if not rows:
         yield "  none: nothing moves"
@@ -153,6 +155,7 @@ def as_data(linearized: Linearized) -> dict[str, Any]:
     """The answers for programs."""
 
     def pole(pole_: Pole) -> dict[str, Any]:
+        """A pole for JSON: z, s (1/s), Hz, damping, and the share of each state."""
         return {
             "z": [pole_.z.real, pole_.z.imag],
             "s": [pole_.s.real, pole_.s.imag] if math.isfinite(pole_.s.real) else None,
@@ -162,6 +165,7 @@ def as_data(linearized: Linearized) -> dict[str, Any]:
         }
 
     def loop(loop_: OpenLoop) -> dict[str, Any]:
+        """An opened loop for JSON: stability, gains, and margins if it has any."""
         margins = loop_.margins
         answer: dict[str, Any] = {"opened": list(loop_.paths), "stable": loop_.stable, "returns": loop_.returns}
         answer |= {"gain_down": loop_.gains[0], "gain_up": loop_.gains[1], "gain_searched_to": loop_.searched}
@@ -303,6 +307,7 @@ def _tightest(loops: dict[int, OpenLoop]) -> Iterator[str]:
 
 
 def _swing(linearized: Linearized) -> tuple[str, ...]:
+    """The cells of a case's least damped pole: damping, Hz, and the joint that swings most."""
     swings = [pole for pole in linearized.poles if pole.z.imag > 0.0]
     if not swings:
         return ("none swings",)

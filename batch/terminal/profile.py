@@ -57,6 +57,7 @@ def _table(profile: RunProfile) -> Iterator[tuple[str, ...]]:
 
 
 def _row(name: str, parts: Sequence[WorkCost], whole: float, *, times: bool = True) -> tuple[str, ...]:
+    """A row of the profile: calls, operations, time (ns) and share of the step."""
     ns = sum(part.ns for part in parts)
     return (
         name,
@@ -77,6 +78,7 @@ def _events(parts: Sequence[WorkCost]) -> str:
 
 
 def _kernel(profile: RunProfile) -> Iterator[tuple[str, str]]:
+    """Rows about the kernel: how it was timed, its block, code size, and the time to make it."""
     yield "timed", f"{profile.steps:,} steps of {count(profile.blocks, 'block')} on one core, best of several"
     yield "block", f"{profile.lanes} cases, {profile.vector} of them in a register ({profile.cpu})"
     yield "code", f"{size(profile.code_bytes)} in {count(profile.pieces, 'piece')}"

@@ -111,7 +111,7 @@ def check_asked(archive: ArchiveFile, by: CaseOrder | None, some: CaseSelection)
 
 
 def show_evidence(archive: ArchiveFile, experiments: Sequence[str] = (), *, width: int = 100) -> str:
-    """The table of evidence of each run and sweep, or of these: the requirements with their evidence."""
+    """The table of evidence (what the cases show of each requirement) of each run and sweep, or of these."""
     out = [f"{archive.path}  ({size_text(archive.path.stat().st_size)}), from {archive.deck.strip('<>')}"]
     for name, groups in by_run(groups_named(archive, tuple(experiments))).items():
         cases = sum(group.run for group in groups)
@@ -123,7 +123,7 @@ def show_evidence(archive: ArchiveFile, experiments: Sequence[str] = (), *, widt
 
 
 def _evidence(archive: ArchiveFile, groups: Sequence[ArchiveGroup]) -> list[RequirementEvidence]:
-    """The rows of the table of evidence of these groups."""
+    """The rows of evidence, what the cases show of each requirement, of these groups."""
     return requirement_evidence(groups, str(archive.path), several=len(by_run(archive.groups)) > 1)
 
 
@@ -310,6 +310,7 @@ def warning_lines(summary: Summary, width: int) -> Iterator[str]:
 
 
 def _counts(summary: Summary) -> str:
+    """How many cases reached their end, in words."""
     if summary.cases == 1:
         return "the case failed" if summary.failed else "the case reached its end"
     done = summary.cases - summary.failed

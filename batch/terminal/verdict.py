@@ -207,6 +207,7 @@ def _may_be_verified(campaign: Campaign, summary: Summary) -> bool:
 
 
 def _why_not(summaries: tuple[Summary, ...]) -> str:
+    """The reasons why a run's outcome is not good, in words."""
     failed = sum(summary.failed for summary in summaries)
     missed = [r for summary in summaries for r in summary.requirements if not r.ok]
     parts = [f"{failed:,} case{'s' if failed != 1 else ''} failed"] if failed else []

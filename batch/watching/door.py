@@ -61,6 +61,8 @@ class Door:
         self._waiting.close()
 
     def _let_come(self) -> None:
+        """Accept a connection, which waits until its first line shows the token; the one that waits longest is turned
+        away where too many wait."""
         try:
             connection, address = self._listening.accept()
         except OSError:  # it has gone again, or there are no more files: those outside make room soon

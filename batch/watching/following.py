@@ -147,6 +147,7 @@ def path_of(name: str) -> Path:
 
 
 def _stamp(path: Path) -> Stamp:
+    """What tells a file's state from another: its time (ns), size and inode; None where there is none."""
     try:
         about = os.stat(path)
     except OSError:

@@ -152,6 +152,7 @@ class PageServer(ThreadingHTTPServer):
         self.server_close()
 
     def _serve(self) -> None:
+        """Let in who has the token, until the server ends."""
         door = Door(self.socket, self.token, self._admit)
         door.open()
         while not self._ended.is_set():
@@ -207,6 +208,8 @@ class _InTime(io.RawIOBase):
         return True
 
     def readinto(self, buffer: Any) -> int:
+        """Read from the connection into a buffer, and return the number of bytes. Raises TimeoutError where the request
+        takes too long."""
         if self._begun:
             count = min(len(buffer), len(self._begun))
             buffer[:count], self._begun = self._begun[:count], self._begun[count:]
@@ -233,6 +236,7 @@ class _Request(BaseHTTPRequestHandler):
         self.rfile = io.BufferedReader(_InTime(self.connection, self.timeout, self.server.begun(self.request)))
 
     def do_GET(self) -> None:
+        """Answer a request for the frame, its events, the page or its numbers."""
         what, number = self._requested()
         if what == "":
             text, policy = frame()
@@ -247,6 +251,7 @@ class _Request(BaseHTTPRequestHandler):
             self._refuse(HTTPStatus.NOT_FOUND)
 
     def do_POST(self) -> None:
+        """Take the choice of a run and a group that is made on the page."""
         what, _ = self._requested(posted=True)
         if what is None:
             return
@@ -295,6 +300,7 @@ class _Request(BaseHTTPRequestHandler):
                 return
 
     def _send(self, body: bytes, kind: str, policy: str) -> None:
+        """Send an answer. kind: its content type; policy: its content security policy"""
         self.send_response(HTTPStatus.OK)
         self._head(kind, policy)
         self.send_header("Content-Length", str(len(body)))

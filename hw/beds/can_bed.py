@@ -103,6 +103,7 @@ class CanBed(BedDriver):
         return self._about
 
     def _greet(self, line: CanLine) -> About:
+        """Greet both drives, and describe the bed by what they say. Raises Problem E402 to E406, E438."""
         self._talk = talk = Talk(line, self._drives)
         for drive_ in self._drives:
             drive_.forget_answers()
@@ -166,8 +167,7 @@ class CanBed(BedDriver):
         return about
 
     def _check_share(self) -> None:
-        """Raise Problem E405 where the frames of an exchange do not fit into a period, and see whether it has room for
-        questions."""
+        """Raise Problem E405 where an exchange does not fit into a period; see whether it has room for questions."""
         check = 0.0 if self._bench.bus["interface"] == SERIAL else 2.0 * on_bus(CanFrame(0, bytes(8)))
         self._asks = self._on_bus() + check <= ASKED_SHARE * self.period
         self.unseen = "; ".join(dict.fromkeys((drive if self._asks else CanDrive).unseen for drive in self._drives))
@@ -242,6 +242,7 @@ class CanBed(BedDriver):
         )
 
     def arm(self) -> BedSample:
+        """Arm both drives, once each has shown that its watchdog stops it. Raises Problem E402, E404, E406."""
         about = self._require_about()
         for drive in self._drives:
             drive.forget_answers()
@@ -263,6 +264,7 @@ class CanBed(BedDriver):
         return self._sample()
 
     def exchange(self, voltage: float, current: float) -> BedSample | None:
+        """Send both drives their torque (or rate), and take what they answer; None where they did not in time."""
         about, force, scales = self._require_about(), self._in_force, self._about_scales()
         kind, unit = f"a {self._kind}", DRIVES[self._kind][0]
         volts = greeting.commanded(voltage, scales.voltage, force.voltage)
@@ -431,8 +433,7 @@ class CanBed(BedDriver):
         return first, other
 
     def _ask_both(self, about: About, agreed: bool = True) -> None:
-        """Ask both drives again and again until both have answered, and agree. Raises Problem E402 where one does not
-        answer, E406 where they do not agree."""
+        """Ask both drives until both have answered and agree. Raises Problem E402 (no answer), E406 (no agreement)."""
         talk = self._talk
         asks = tuple(dict.fromkeys(frame for drive in self._drives for frame in drive.query()))
         for _ in range(ASKS):
@@ -466,8 +467,7 @@ class CanBed(BedDriver):
             self._filtered = side.rate, 0.0
 
     def _watch(self) -> None:
-        """Stop where a drive has stopped or another master commands it, the supply's voltage is too high, or the shaft
-        is too fast."""
+        """Stop where a drive stopped, another master commands one, or the supply's voltage or the rate is too high."""
         if other := self._talk.other_master:
             self._stopped(Fault.OTHER_MASTER, other)
             return
@@ -498,8 +498,7 @@ class CanBed(BedDriver):
         return self._require_about().scales
 
     def _drive_command(self, sent: float) -> float:
-        """The command for the drive under test, N m: the value sent, or the torque of an armature at it, V; for a rate
-        drive the rate sent, rad/s, which is within its limit."""
+        """The command for the drive under test: N m, as sent or of an armature at the voltage sent; or rad/s."""
         if self._kind == "rate":
             return sent
         if self._kind == "torque":
@@ -512,8 +511,7 @@ class CanBed(BedDriver):
         self._volts, self._amperes, self._told_at = volts, amperes, time
 
     def _warm(self, now: float) -> None:
-        """Update the load's heat, A^2 s, from the command so far, and stop where it is too much; sum up the energy that
-        the drives returned."""
+        """Update the load's heat, A^2 s, and stop where it is too much; add up the energy that drives returned."""
         about = self._require_about()
         passed, self._warmed = now - self._warmed, now
         held = self._amperes * about.scales.current
@@ -562,6 +560,7 @@ class CanBed(BedDriver):
 
 
 def _opened_port(opening: Opening) -> CanBed:
+    """The bed of `--port can:BENCH.toml`, its line still closed. Raises Problem E409, E446."""
     if opening.port.transcript is not None:
         helps = "records are kept of every exchange; `candump` keeps what goes over a bus"
         raise Problem(error("E409", "no transcript is kept of a CAN bus", help=helps))

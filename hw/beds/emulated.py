@@ -93,6 +93,7 @@ class EmulatedBed(BedDriver):
         bears: float | None = None,
         drive: DriveCommand = "voltage",
     ) -> None:
+        """scales: SI units of a count; limits: the bed's own, in SI"""
         self._plant, self._name, self._scales, self._limits, self._drive = plant, name, scales, limits, drive
         self._bears = limits.current if bears is None else bears
         self._about: About | None = None
@@ -102,6 +103,7 @@ class EmulatedBed(BedDriver):
         self.voltage, self.current = 0.0, 0.0
 
     def connect(self) -> About:
+        """Describe the bed, which is at hand at once, and disarm it."""
         capabilities = Capability.ENCODER | Capability.LOCK_STEP | Capability.SIMULATED
         about = About(
             self._name,
@@ -120,6 +122,7 @@ class EmulatedBed(BedDriver):
         return about
 
     def limit(self, requested: Mapping[str, float]) -> None:
+        """Make limits tighter. Raises Problem E406 unless the bed is disarmed."""
         about = self._require_about()
         tighter = greeting.tighter(about, requested)
         if self._state != BedState.DISARMED:
@@ -130,6 +133,7 @@ class EmulatedBed(BedDriver):
         )
 
     def arm(self) -> BedSample:
+        """Arm the simulated bed with 0 commanded. Raises Problem E406 unless it is disarmed and slow."""
         about = self._require_about()
         if self._state != BedState.DISARMED or not self._slow():
             raise refusals.refused(about, "arm", self._sample(refused=True))
@@ -138,6 +142,8 @@ class EmulatedBed(BedDriver):
         return self._sample()
 
     def exchange(self, voltage: float, current: float) -> BedSample | None:
+        """Set both commands, and advance the simulated plant by a period. A step of a command that is beyond its slew
+        limit is a fault."""
         about, force, scales = self._require_about(), self._in_force, self._scales
         volts = greeting.commanded(voltage, scales.voltage, force.voltage)
         amperes = greeting.commanded(current, scales.current, force.current)
@@ -165,6 +171,7 @@ class EmulatedBed(BedDriver):
         return self._sample()
 
     def clear(self) -> BedSample:
+        """Forget latched faults. Raises Problem E406 while the bed is armed, hot or not at rest."""
         about = self._require_about()
         hot = Fault.HEAT in self._faults and self._heat > self._limits.heat / 2.0
         if self._state == BedState.ARMED or (self._state == BedState.STOPPED and (hot or not self._slow())):
@@ -173,6 +180,7 @@ class EmulatedBed(BedDriver):
         return self._sample()
 
     def rest(self, time: float) -> BedSample:
+        """Stop, and advance the simulated shaft by `time` s."""
         self._require_about()
         self.stop()
         for _ in range(math.ceil(time / self._plant.period - 1e-6)):
@@ -180,6 +188,7 @@ class EmulatedBed(BedDriver):
         return self._sample()
 
     def preset(self, *, rate: float = 0.0, seed: int = 0, repeat: int = 0) -> BedSample:
+        """Start the simulated shaft anew. Raises Problem E406 unless the bed is disarmed."""
         about = self._require_about()
         if self._state != BedState.DISARMED or not math.isfinite(rate):
             raise refusals.refused(about, "start its plant anew", self._sample(refused=True))
@@ -220,7 +229,7 @@ class EmulatedBed(BedDriver):
         self._faults |= faults
 
     def _advance(self) -> None:
-        """Advance the plant by a tick, and stop where the rate or the heat is beyond its limit."""
+        """Advance the simulated shaft by a tick, and stop where the rate or the heat is beyond its limit."""
         self._rate = self._counted(self._plant.tick(self.voltage, self.current))
         self._tick += 1
         self._since += 1
@@ -239,6 +248,8 @@ class EmulatedBed(BedDriver):
 
 
 def _opened_port(opening: Opening) -> EmulatedBed:
+    """The bed of `--port emulated`, from the deck's model of it. Raises Problem E409 where a transcript is asked
+    for."""
     if opening.port.transcript is not None:
         helps = "`--port firmware` has one; with `--lock-step` it gives the same bits"
         raise Problem(error("E409", "an emulated bed has no line whose transcript could be kept", help=helps))

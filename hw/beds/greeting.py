@@ -111,6 +111,7 @@ def counts(value: float, scale: float) -> int:
 
 
 def _scales(scales: Scales, capabilities: Capability) -> list[str]:
+    """The faults of a bed's counts, in words: one that is no number above zero."""
     missing = {name for name, sensor in _SENSORS.items() if sensor not in capabilities}
     return [
         f"a count of its {_words(name)} is {value:g} {_UNITS[name]}"
@@ -120,6 +121,7 @@ def _scales(scales: Scales, capabilities: Capability) -> list[str]:
 
 
 def _limits(limits: Limits, scales: Scales) -> Iterator[str]:
+    """The faults of a bed's limits, in words: one that is no number above zero, or does not fit in counts."""
     for name, value in limits.__dict__.items():
         scale = getattr(scales, name, None)
         if not (math.isfinite(value) and value > 0.0):

@@ -63,6 +63,7 @@ class _ReplayedLine:
         return self._records[self._position - 1].time if self._position else 0.0
 
     def send(self, frame: bytes) -> None:
+        """Check that the transcript has this question next. Raises Problem E407 or E401 where it has not."""
         position = self._position
         record = self._next(SENT)
         if record is None or record.data != frame:
@@ -70,6 +71,8 @@ class _ReplayedLine:
             raise self._other(f"{self._words(frame)} is asked")
 
     def receive(self, until: float) -> bytes:
+        """The bytes that the transcript has next, or none where the bed did not answer in time. Raises Problem E401
+        where the line was lost then."""
         record = self._next(RECEIVED)
         if record is not None:
             self._note(record.data)
@@ -94,6 +97,7 @@ class _ReplayedLine:
         return self._records[self._position - 1]
 
     def _note(self, data: bytes) -> None:
+        """Note tick and scales from answers of the bed, for messages."""
         for payload in self._decoder.feed(data):
             if payload[0] == messages.SampleAnswer.kind:
                 self._tick = int.from_bytes(payload[5:9], "little")
@@ -114,6 +118,7 @@ class _ReplayedLine:
         return Problem(error("E407", f"{self._name}: {after} {question}; then it was {then}", help=helps))
 
     def _words(self, frame: bytes) -> str:
+        """A message of the host in words, for the error that it differs from the transcript's."""
         payload = unframed(frame[:-1])
         numbered = None if payload is None else messages.host_message(payload)
         if numbered is None:
@@ -148,6 +153,7 @@ def _was_in_lock_step(name: str, requested: bool) -> bool:
 
 
 def _opened_port(opening: Opening) -> ReplayBed:
+    """The bed that replays a transcript. Raises Problem E409 where another transcript is asked for."""
     name = opening.port.name
     if opening.port.transcript is not None:
         helps = f"leave out `--transcripts`: {name} is what it would be"

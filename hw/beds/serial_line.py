@@ -38,6 +38,7 @@ class SerialBed(WireBed):
         self._writer = None if transcript is None else TranscriptWriter(transcript, header)
 
     def connect(self) -> About:
+        """Greet the bed. Raises Problem E405 where the line is too slow for the period."""
         about = super().connect()
         waits = Capability.LOCK_STEP not in about.capabilities and urlsplit(self._name).scheme not in ("socket", "unix")
         share = needed(about.capabilities, self.baud) / self.period

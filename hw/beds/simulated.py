@@ -71,6 +71,7 @@ class SimulatedBed(WireBed):
             self._process = None
 
     def _line_to_process(self) -> BedLine:
+        """Start the firmware as a program of this machine; returns the line to it."""
         ours, theirs = socket.socketpair()
         with theirs:
             number = theirs.fileno()
@@ -81,6 +82,8 @@ class SimulatedBed(WireBed):
         return SocketLine(ours)
 
     def _in_an_emulator(self) -> BedLine:
+        """Start the firmware in an emulator; returns the line to it. Raises Problem E402 where it does not start in
+        time."""
         with tempfile.TemporaryDirectory(prefix="met-bed-") as folder:
             path = Path(folder) / "line"
             self._process = subprocess.Popen(
@@ -119,6 +122,8 @@ class SocketLine(HostClock):
             raise _lost(reason.strerror) from None
 
     def receive(self, until: float) -> bytes:
+        """The bytes that come before the time `until`, s of the clock; none where none do. Raises Problem E401 where
+        the line was closed."""
         if not select.select((self._connection,), (), (), max(0.0, until - time.perf_counter()))[0]:
             return b""
         try:
@@ -135,6 +140,7 @@ class SocketLine(HostClock):
 
 
 def _lost(why: str | None) -> Problem:
+    """The error that the firmware's process has ended (E401)."""
     return Problem(
         error(
             "E401",
@@ -169,6 +175,8 @@ def config_of(values: Mapping[str, float], period: float, *, lock_step: bool) ->
 
 
 def _opened_port(opening: Opening, kind: Literal["firmware", "qemu"]) -> SimulatedBed:
+    """The bed of `--port firmware` or `qemu`, from the deck's model of it. Raises Problem E404 where its numbers do not
+    fit in counts."""
     transcript, period = opening.transcript(), opening.period
     config = config_of(opening.bed_values(), period, lock_step=opening.port.lock_step)
     text = plant_c(opening.simulated(), opening.joint, case=opening.row, period=period)

@@ -79,6 +79,7 @@ class WireBed(BedDriver):
         """Open a new line. Raises Problem E400, E405."""
 
     def connect(self) -> About:
+        """Open the line, and greet the bed."""
         self.close()
         self._line, self._decoder, self._angle = self.open(), Decoder(), None
         self._question_count = 0
@@ -90,6 +91,8 @@ class WireBed(BedDriver):
         return self._about
 
     def _greet(self) -> About:
+        """Ask the bed for its description until it answers. Raises Problem E402 where it does not, E403 or E404 where
+        MET cannot drive it."""
         line = self._line
         assert line is not None
         self._line = heard = TappedLine(line)
@@ -113,6 +116,7 @@ class WireBed(BedDriver):
         return about
 
     def limit(self, limits: Mapping[str, float]) -> None:
+        """Send tighter limits. Raises Problem E406 where the bed does not take them."""
         about = self._require_about()
         for name, most in greeting.tighter(about, limits).items():
             limits_answer = self._ask(messages.LimitMessage(LIMIT_NAMES.index(name), most), LimitsAnswer)
@@ -122,6 +126,7 @@ class WireBed(BedDriver):
             self._in_force = limits_answer
 
     def arm(self) -> BedSample:
+        """Ask the bed to arm, again where its answer is lost. Raises Problem E406 where it refuses."""
         about = self._require_about()
         # so that a bed whose answer was lost is asked again before its deadman has it; or says that it has
         waits = _WAITS if self._step else (*(about.deadman / 3,) * 3, _WAITS[-1])
@@ -135,6 +140,7 @@ class WireBed(BedDriver):
         return sample
 
     def exchange(self, voltage: float, current: float) -> BedSample | None:
+        """Send both commands in counts of the bed's scales; None where no answer comes within `patience`."""
         about = self._require_about()
         volts = self._counts("a voltage", voltage, about.scales.voltage, self._in_force.voltage, "V")
         amperes = self._counts("a current", current, about.scales.current, self._in_force.current, "A")
@@ -151,6 +157,7 @@ class WireBed(BedDriver):
         return replace(sample, state=BedState.STOPPED, faults=sample.faults | Fault.OTHER_MASTER)
 
     def _counts(self, what: str, value: float, scale: float, most: int, unit: str) -> int:
+        """A command in counts. Stops the bed and raises Problem E408 where it is no number or beyond its limit."""
         counts = greeting.commanded(value, scale, most)
         if counts is None:
             self.stop()
@@ -167,6 +174,7 @@ class WireBed(BedDriver):
         return None if answer is None else self._sample(answer)
 
     def clear(self) -> BedSample:
+        """Ask the bed to forget its faults. Raises Problem E406 where it does not."""
         about = self._require_about()
         sample = self._sample(self._ask(messages.ClearMessage(), SampleAnswer))
         if sample.state != BedState.DISARMED:
@@ -174,6 +182,8 @@ class WireBed(BedDriver):
         return sample
 
     def rest(self, time: float) -> BedSample:
+        """Stop the bed, let `time` s pass, and read its sensors; a bed in lock-step advances by as many ticks. Raises
+        Problem E402."""
         about = self._require_about()
         self.stop()
         if Capability.LOCK_STEP not in about.capabilities:
@@ -192,6 +202,7 @@ class WireBed(BedDriver):
         return sample
 
     def preset(self, *, rate: float = 0.0, seed: int = 0, repeat: int = 0) -> BedSample:
+        """Start the bed's simulated plant anew. Raises Problem E406 for a real bed, or where it refuses."""
         about = self._require_about()
         if Capability.SIMULATED not in about.capabilities:
             raise real_plant()
@@ -202,6 +213,8 @@ class WireBed(BedDriver):
         return sample
 
     def stop(self) -> bool:
+        """Ask the bed to stop until it confirms; returns whether it did. A bed that stays armed is greeted, which
+        disarms it."""
         if self._line is None or self._about is None:
             return self.confirmed
         for _ in range(2):  # a transcript that cannot be written is in the way once
@@ -232,12 +245,14 @@ class WireBed(BedDriver):
         return self._about
 
     def _ask(self, message: HostMessage, kind: type[T], waits: Sequence[float] = _WAITS) -> T:
+        """The answer to a question, asked again where it is lost. Raises Problem E402 where none comes."""
         answer = self._ask_again(message, kind, waits)
         if answer is None:
             raise refusals.silent(self._require_about().name, message.word)
         return answer
 
     def _ask_again(self, message: HostMessage, kind: type[T], waits: Sequence[float]) -> T | None:
+        """The answer to a question, asked once for each wait, s; None where none comes."""
         for wait in waits:
             answer = self._answer(message, kind, wait)
             if answer is not None:
@@ -271,6 +286,7 @@ class WireBed(BedDriver):
         return None
 
     def _sample(self, answer: SampleAnswer) -> BedSample:
+        """The sensors' readings in SI, and the bed's state, from its answer."""
         status, scale = answer.status, self._require_about().scales.rate
         read = dict[str, float]()
         for (name, scale_), counts in zip(self._sensors, answer.others, strict=not self._has_interlock):
@@ -287,6 +303,7 @@ class WireBed(BedDriver):
         )
 
     def _unwrapped(self, counts: int) -> int:
+        """The angle in counts since the first sample, from counts that begin anew beyond 32 bits."""
         before, angle = self._angle or (counts, counts)
         angle += (counts - before + messages.MOST + 1) % (2 * messages.MOST + 2) - messages.MOST - 1
         self._angle = counts, angle

@@ -355,7 +355,8 @@ _PERIOD = re.compile(r"\bplant_period\s*=\s*([^;]*?)\s*;")
 
 
 def _check_period(config: Config, plant_c: str) -> None:
-    """Raise ValueError where the plant's period is not a tick."""
+    """Raise ValueError where the period of the simulated plant (the bed's shaft and motors) is not a tick of the
+    firmware."""
     match_ = _PERIOD.search(plant_c)
     word = "" if match_ is None else match_[1]
     macro = re.search(rf"#\s*define\s+{re.escape(word)}\s+(\S+)", plant_c) if word.isidentifier() else None
@@ -442,6 +443,7 @@ def config_c(config: Config, *, plant: bool, firmware: bytes = bytes(8)) -> str:
 
 
 def _sources(kind: Kind, *, plant: bool) -> list[Path]:
+    """The C files of a kind of firmware. plant: whether it simulates its bed"""
     folders = ["core", *(["plant"] if plant else []), *(["bare", kind] if kind in _CROSS else [])]
     paths = [path for folder in folders for path in sorted((FIRMWARE / folder).glob("*.c"))]
     if kind == "pico":
@@ -504,8 +506,8 @@ def _compile(
 
 
 def _fused() -> tuple[str, ...]:
-    """The flag by which a plant uses this processor's fused multiply-add. Without it one in software gives the same
-    bits."""
+    """The compiler's flag for this processor's fused multiply-add, which the simulated shaft needs. Without it one in
+    software gives the same bits."""
     return ("-mfma",) if "fma" in system.cpu_flags() else ()
 
 

@@ -136,11 +136,12 @@ def wiring_c(wiring: Mapping[str, int]) -> str:
 
 
 def lock_step_wiring(tick_hz: float) -> dict[str, int]:
-    """The wiring of a Pico whose plant is simulated: nothing is connected to it."""
+    """The wiring of a Pico that simulates its bed, so that nothing is connected to it."""
     return {"reload": round(CLOCK / tick_hz) - 1, "watchdog": 0}
 
 
 def _bench(figures: Mapping[str, Any]) -> PicoBench:
+    """The bench of these figures, SI by `table.key`. Raises ValueError where they do not fit together."""
     tick_hz: float = figures["bed.tick"]
     if not 200.0 <= tick_hz <= 4000.0:
         raise ValueError(f"a tick of {tick_hz:g} Hz is not 200 Hz to 4 kHz")
@@ -246,6 +247,8 @@ def _warmest(figures: Mapping[str, Any]) -> int:
 
 
 def _bus(figures: Mapping[str, Any]) -> tuple[int, int]:
+    """The least and greatest reading of the bus voltage, in steps of the converter; all of them where it is not
+    measured. Raises ValueError."""
     if "interlock.bus_full" not in figures:
         return 0, STEPS
     least, most = (
@@ -289,6 +292,7 @@ class _File(TomlFile):
         return figures
 
     def _figure(self, table: str, key: str, kind: str, value: Any) -> Any:
+        """The value of a key in SI, by the kind of its schema. Raises Problem E447 where it is of another kind."""
         good = {
             _TEXT: lambda: isinstance(value, str) and value.isascii() and value.isprintable() and 1 <= len(value) <= 16,
             _FLAG: lambda: isinstance(value, bool),

@@ -178,6 +178,8 @@ class _BenchFile(TomlFile):
         )
 
     def _bus(self) -> dict[str, Any]:
+        """The keys of `[bus]`, with which the bus is opened. Raises Problem E446 where one is missing or of the wrong
+        type."""
         figures = self.tables["bus"]
         for key in ("interface", "channel"):
             if key not in figures:
@@ -196,7 +198,7 @@ class _BenchFile(TomlFile):
         return dict(figures)
 
     def _lines(self, drive: DriveEntry, load: DriveEntry) -> dict[str, Any]:
-        """`[bus]` of drives on serial lines, with their ports."""
+        """The `[bus]` of drives on serial lines, with the port of each."""
         figures = self.tables["bus"]
         for key in figures:
             if key not in ("interface", "baud"):
@@ -243,6 +245,7 @@ class _BenchFile(TomlFile):
         return DriveEntry(role, dialect, node, -1 if reversed_ else 1, figures, endpoints, model, port)
 
     def _figures(self, table: str, others: tuple[str, ...] = ()) -> dict[str, float]:
+        """The figures of a table of the bench file, SI. Raises Problem E446 for an unknown key."""
         known = (*FIGURES[table], *_WORDS[table], *others)
         for key in self.tables[table]:
             if key not in known:
@@ -265,6 +268,7 @@ class _BenchFile(TomlFile):
             raise self.wrong(message, f'write `{key} = "1.5 {unit}"`', table, key) from None
 
     def _word(self, table: str, key: str, default: str | None) -> str:
+        """The word of a key of the bench file. Raises Problem E446 where it is missing or unknown."""
         word, known = self.tables[table].get(key, default), _WORDS[table][key]
         if not isinstance(word, str) or not word.isprintable() or (known and word and word not in known):
             helps = f"one of: {', '.join(known)}" if known else f'`{key} = "..."`'

@@ -56,6 +56,7 @@ class PythonCanLine(HostClock):
         self._offset = time.perf_counter() - time.time()  # interfaces stamp frames by the time of day
 
     def send(self, frame: CanFrame) -> None:
+        """Send a frame. Raises Problem E401."""
         message = self._message(
             arbitration_id=frame.id,
             data=frame.data,
@@ -70,6 +71,8 @@ class PythonCanLine(HostClock):
             raise self._lost(reason) from None
 
     def receive(self, until: float) -> CanFrame | None:
+        """The next frame that comes before the time `until` of the line's clock, s; None where none does. Raises
+        Problem E401."""
         while True:
             try:
                 message = self._bus.recv(max(0.0, until - time.perf_counter()))
@@ -96,6 +99,7 @@ class PythonCanLine(HostClock):
             self._bus.shutdown()
 
     def _lost(self, reason: Exception) -> Problem:
+        """The error that the bus was lost (E401)."""
         helps = (
             "the drives stop themselves when they hear nothing for the time of their watchdog",
             "look at the cable, its two terminators and the interface, then start again",
@@ -124,6 +128,8 @@ class SerialPair(HostClock):
         self._lines[frame.id].send(frame.data)
 
     def receive(self, until: float) -> CanFrame | None:
+        """The next bytes of either line as a frame, by its drive's number; None where none come before the time
+        `until`, s."""
         files = [line.file for line in self._lines.values() if line.file is not None]
         while True:
             if len(files) == len(self._lines):

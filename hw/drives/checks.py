@@ -44,8 +44,8 @@ class SetpointChecks:
         self.begin(())
 
     def begin(self, commands: Sequence[str], settings: Mapping[str, float] | None = None) -> None:
-        """Begin anew. commands: what the drive is asked for, what it is told, then what it is told as 0 with that;
-        settings: what else, with its values"""
+        """Begin anew. commands: names of the drive's commanded quantities to ask for, first the one that is commanded,
+        then those that are 0 meanwhile; settings: other values that must stay"""
         self._commands, self._settings = tuple(commands), dict(settings or {})
         self._count = self._doubts = 0
         self._odd: dict[str, float] = {}
@@ -76,8 +76,8 @@ class SetpointChecks:
         return self.open_question
 
     def answered(self, value: float, time: float) -> str:
-        """Take the answer to the last question, at a time of the line's clock, s. Returns what was changed by another
-        master, in words; "" where that is not sure."""
+        """Take the answer to the last question, at a time of the line's clock, s. Returns what another master has
+        changed, in words; "" while that is not sure."""
         what, self.open_question = self.open_question, ""
         right = (self._settings.get(what, 0.0),) if what not in self._commands[:1] else self._commanded
         if any(abs(value - expected) <= self._apart + SAME * abs(expected) for expected in right):

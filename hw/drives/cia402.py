@@ -103,6 +103,8 @@ class Cia402Drive(CanDrive):
         """Objects that are asked for in a run, with what they hold, by their names."""
 
     def greet(self, talk: Talk) -> DriveFacts:
+        """Check that this is a CiA 402 drive with the mode that is wanted, and set its PDOs; it is idle afterwards.
+        Raises Problem E402 to E404."""
         self._wanted, self._control = False, OFF
         if not 0 < self.node < HOST:
             raise self.wrong("its number is none of CANopen's, or the host's", "a number from 1 to 126")
@@ -157,7 +159,8 @@ class Cia402Drive(CanDrive):
         )
 
     def _prepare_checks(self, talk: Talk) -> None:
-        """Find which objects it can be asked for in a run: what it is told, and what nobody then changes."""
+        """Find the objects that the drive can be asked for during a run: its targets, and limits that nobody then
+        changes. Another master's commands show in their answers."""
         commanded, other = (TARGET_RATE, TARGET_TORQUE) if self.rates else (TARGET_TORQUE, TARGET_RATE)
         self._objects = {
             _words(which): (which, layout)
@@ -174,8 +177,8 @@ class Cia402Drive(CanDrive):
         self._set_up(talk)
 
     def _most(self, talk: Talk) -> float:
-        """The largest torque that it may be told, in thousandths of its rated torque. Where its own loop asks for it
-        that is no more than the bench bears."""
+        """The largest torque that the drive may be commanded, in thousandths of its rated torque. In rate mode the
+        drive's own limit is first lowered to what the bench bears."""
         if self.rates and self._rated > 0.0:
             bears = math.floor(1e3 * self.entry.figures["torque_max"] / self._rated + 1e-6)
             if bears < self._read(talk, MOST, "<H"):
@@ -239,6 +242,7 @@ class Cia402Drive(CanDrive):
         return float(struct.unpack_from(layout, first, 4)[0])
 
     def _write(self, talk: Talk, which: tuple[int, int], layout: str, value: int) -> None:
+        """Set an object by SDO. layout: of its value, as of struct. Raises Problem E402, E404."""
         size = struct.calcsize(layout)
         head = 0x23 | (4 - size) << 2
         what = f"to set {_words(which)}"
@@ -279,7 +283,8 @@ class Cia402Drive(CanDrive):
         return frame.id == SYNC
 
     def checks(self) -> Sequence[CanFrame]:
-        """An SDO that asks for what it was told, before it is told anew; those to the two drives take turns."""
+        """The question by SDO for a target or limit that is due, before the next command replaces it; the two drives
+        take turns."""
         self._turn += 1
         every = DOUBTED_EVERY if self._checks.doubtful else CHECK_EVERY
         turn = self._turn + every // 2 * (self.entry.role == "load")
@@ -288,6 +293,8 @@ class Cia402Drive(CanDrive):
         return (CanFrame(SDO_ASK + self.node, _upload(self._objects[what][0])),)
 
     def is_command(self, frame: CanFrame) -> bool:
+        """True for a frame that changes what this drive does: NMT, an SDO that writes, a target, a SYNC or the host's
+        heartbeat."""
         if frame.extended or frame.fd or frame.remote:
             return False
         if frame.id == NMT:
@@ -308,6 +315,8 @@ class Cia402Drive(CanDrive):
         return (CanFrame(TPDO1 + self.node, bytes(3)), CanFrame(TPDO2 + self.node, bytes(8)))
 
     def take(self, frame: CanFrame) -> bool:
+        """Take an answer to SDO, a PDO or an emergency message of this drive. Returns whether the frame is one and
+        new."""
         if frame.extended or frame.fd or frame.remote or frame.id & 0x7F != self.node:
             return False
         which, data = frame.id & 0x780, frame.data
@@ -330,7 +339,8 @@ class Cia402Drive(CanDrive):
         return True
 
     def _check(self, data: bytes, time: float) -> None:
-        """Take the answer to what it was told, where it was asked."""
+        """Take the answer to the question for a target or limit; another value than this host's shows another master.
+        time: of the frame, s"""
         if not self._checks.open_question:
             return
         which, layout = self._objects[self._checks.open_question]
@@ -341,6 +351,8 @@ class Cia402Drive(CanDrive):
             self.disturbed = f"{self.words} was commanded by another: {what}"
 
     def _status(self, status: int, mode: int, time: float) -> None:
+        """Take a statusword: the drive's state, why it failed, and the next controlword on the way to where it is
+        wanted. time: of the frame, s."""
         self.stated, drove = time, self.state == DriveState.DRIVING
         if status & 0x4F in (0x08, 0x0F):
             self.state, self.errors = DriveState.FAILED, f"error 0x{self._error:04X}"

@@ -69,6 +69,8 @@ class DamiaoDrive(CanDrive):
         self._angle_max = self._rate_max = self._torque_max = 1.0
 
     def greet(self, talk: Talk) -> DriveFacts:
+        """Read the ranges of this drive's fields, and set its MIT mode and watchdog; it is idle afterwards. Raises
+        Problem E402, E404."""
         self._answers_as = -1
         if not 0 < self.node <= MOST_NODE:
             raise self.wrong("its number is none that its answers have room for", f"a number from 1 to {MOST_NODE}")
@@ -103,6 +105,7 @@ class DamiaoDrive(CanDrive):
         )
 
     def _register(self, talk: Talk, register: int, code: int, data: bytes) -> bytes:
+        """Read or write a register; returns its four bytes. Raises Problem E402 where the drive does not answer."""
         self._wanted, self._came = register, None
         frame = CanFrame(REGISTERS, struct.pack("<HBB", self.node, code, register) + data)
         if not talk.ask([frame], lambda: self._came is not None):
@@ -152,6 +155,7 @@ class DamiaoDrive(CanDrive):
         return refresh or frame.id == self.node
 
     def is_command(self, frame: CanFrame) -> bool:
+        """True for a frame that writes a register of this drive, or commands it in any of its modes."""
         data = frame.data
         if frame.extended or frame.fd or frame.remote or frame.id == self._answers_as:
             return False
@@ -170,6 +174,8 @@ class DamiaoDrive(CanDrive):
         return (self._frame(bytes(8)),)
 
     def take(self, frame: CanFrame) -> bool:
+        """Take an answer of this drive: a register's value, or angle, rate and state. Returns whether the frame is one
+        and new."""
         data = frame.data
         if frame.extended or frame.fd or frame.remote or len(data) != 8 or frame.id in (self.node, REGISTERS):
             return False

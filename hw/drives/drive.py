@@ -212,9 +212,8 @@ class CanDrive(ABC):
         self._turned = -math.inf
 
     def has_said(self, fields: Hashable, rate: float, time: float) -> bool:
-        """True for an old frame: angle and rate, as an answer has them, are those of one within the last 50 ms, and the
-        shaft has turned since: by more than a step of the angle, as they say themselves, or as another answer said that
-        came between. rate: rad/s;  time: of the frame, s"""
+        """True for an answer that is older than the last ones: it repeats angle and rate of one within the last 50 ms,
+        and the shaft has turned since by more than a step of the angle. rate: rad/s;  time: of the frame, s"""
         angle_step, rate_step = self.steps
         turns = max(0.0, abs(rate) - rate_step)
         before = self._said_since.pop(fields, None)
@@ -278,6 +277,7 @@ class Talk:
             drive.disturbed = ""
 
     def send(self, frames: Iterable[CanFrame]) -> None:
+        """Send frames, and count the questions among them for the drives that are to answer."""
         for frame in frames:
             self.line.send(frame)
             now, content = self.line.now(), _content(frame)
@@ -314,7 +314,8 @@ class Talk:
             self.strange[frame.id] = self.strange.get(frame.id, 0) + 1
 
     def _taken(self, drive: CanDrive, frame: CanFrame) -> bool:
-        """Give a frame to a drive. Returns whether it was its; an answer is to the oldest question that it owes."""
+        """Give a frame to a drive; returns whether it was this drive's. An answer settles the oldest question that the
+        drive has not answered (`owed`)."""
         before = drive.reading
         if not drive.take(frame):
             return False

@@ -80,6 +80,7 @@ class FdcanusbLine(LineOverLine):
             raise
 
     def send(self, frame: CanFrame) -> None:
+        """Send a frame as a line of the adapter's text. Raises Problem E404 for one without data."""
         if not frame.data:
             message = f"an fdcanusb, on {self._name}, cannot send a frame without data, as these drives need"
             helps = "moteus, Damiao and RobStride need none; for the others another adapter"
@@ -90,6 +91,7 @@ class FdcanusbLine(LineOverLine):
         self._line.send(f"can {kind} {frame.id:X} {frame.data.hex().upper()} {flags}\n".encode())
 
     def receive(self, until: float) -> CanFrame | None:
+        """The next frame that comes before the time `until`, s; None where none does."""
         late = 0
         while not self._frames:
             data = self._line.receive(until)
@@ -110,6 +112,8 @@ class FdcanusbLine(LineOverLine):
             self._rest = bytes(LONGEST_LINE + 1)
 
     def _take(self, text: bytes, time: float) -> None:
+        """Take a line of the adapter: a confirmation, an error, or a received frame. Raises Problem E401 where it is
+        off the bus."""
         if text == b"OK" or text.startswith(b"ERR"):
             self._forget(time)
             if self._sent:

@@ -128,6 +128,7 @@ def answered(data: bytes) -> dict[int, float] | None:
 
 
 def _number(data: bytes, position: int) -> tuple[int, int]:
+    """A number of variable length at a position of the data, and the position behind it."""
     value = shift = 0
     while True:
         byte, position = data[position], position + 1
@@ -153,6 +154,7 @@ class MoteusDrive(CanDrive):
         self._watchdog = figures["watchdog"]
 
     def greet(self, talk: Talk) -> DriveFacts:
+        """Check the model and register map of this moteus, and stop it. Raises Problem E402 to E404."""
         self._about = {}
         if not self.node > 0:
             raise self.wrong("its number is everybody's", "a number from 1 to 127")
@@ -179,6 +181,7 @@ class MoteusDrive(CanDrive):
         return (self._frame(written(INT8, MODE, STOPPED)), *self.command(0.0))
 
     def command(self, value: float) -> Sequence[CanFrame]:
+        """The frame that commands a torque, N m, for the time of the watchdog, and asks for the state."""
         torque = (self.own(value), 0.0, 0.0, self._most)  # and no part of its gains
         data = written(INT8, MODE, DRIVING) + written(FLOAT, TARGET, math.nan) + written(FLOAT, TORQUE, *torque)
         data += written(FLOAT, VALID_FOR, self._watchdog) + written(FLOAT, INTEGRAL_SCALE, 0.0)
@@ -206,6 +209,8 @@ class MoteusDrive(CanDrive):
         return (CanFrame(self.node << 8, bytes(32), extended=False, fd=True),)
 
     def take(self, frame: CanFrame) -> bool:
+        """Take registers that this moteus answers: its model, or mode, angle, rate and supply. Returns whether the
+        frame has them and is new."""
         if frame.id != self.node << 8 or not frame.fd or frame.remote:
             return False
         registers = answered(frame.data)
@@ -228,6 +233,7 @@ class MoteusDrive(CanDrive):
         return True
 
     def _state(self, mode: int, fault: int, time: float) -> None:
+        """Take the mode and the fault of an answer as the drive's state. time: of the frame, s"""
         self.stated, self.errors, self.starved = time, "", mode == TIMED_OUT
         if mode in (STOPPED, BRAKING, *BEGINNING):
             self.state = DriveState.IDLE

@@ -80,6 +80,8 @@ class OdriveDrive(OdriveAxis):
         self._beats = self._turn = 0
 
     def greet(self, talk: Talk) -> DriveFacts:
+        """Check the firmware of this ODrive, set its reports, and read its limits; it is idle afterwards. Raises
+        Problem E402 to E404."""
         self._version, self._beats = None, 0
         self._written.clear()
         if self.node > MOST_NODE:
@@ -128,6 +130,7 @@ class OdriveDrive(OdriveAxis):
         return numbers
 
     def _property(self, talk: Talk, number: int, payload: bytes) -> bytes:
+        """Read or write a property; returns its bytes. Raises Problem E402 where the drive does not answer."""
         self._answered.pop(number, None)
         frame = self._frame(READ_OR_WRITE, payload)
         if not talk.ask([frame], lambda: number in self._answered):
@@ -159,6 +162,7 @@ class OdriveDrive(OdriveAxis):
         return CanFrame(self.node << 5 | command, data)
 
     def armed(self) -> Sequence[CanFrame]:
+        """Frames that set the mode, command 0, and close the loop."""
         return (
             self._frame(MODES, struct.pack("<II", self._mode, PASSTHROUGH)),
             *self.command(0.0),
@@ -166,6 +170,7 @@ class OdriveDrive(OdriveAxis):
         )
 
     def command(self, value: float) -> Sequence[CanFrame]:
+        """The frame that commands a torque, N m, or a rate, rad/s."""
         self._checks.tell(self.own(value) / TURN if self.rates else self.own(value))
         if self.rates:  # with no torque besides that of its loop
             return (self._frame(RATE, struct.pack("<ff", self.own(value) / TURN, 0.0)),)
@@ -178,6 +183,7 @@ class OdriveDrive(OdriveAxis):
         return frame.remote and frame.id == self.node << 5 | ESTIMATES
 
     def is_command(self, frame: CanFrame) -> bool:
+        """True for a frame to this axis that is neither an answer nor only reads a property."""
         if frame.extended or frame.fd or frame.remote or frame.id >> 5 != self.node:
             return False
         command = frame.id & 0x1F
@@ -206,6 +212,8 @@ class OdriveDrive(OdriveAxis):
         return (self._frame(ESTIMATES, bytes(8)),)
 
     def take(self, frame: CanFrame) -> bool:
+        """Take a frame of this axis: estimates, heartbeat, version, supply or a property's value. Returns whether it is
+        one and new."""
         if frame.extended or frame.fd or frame.remote or frame.id >> 5 != self.node:
             return False
         command, data = frame.id & 0x1F, frame.data

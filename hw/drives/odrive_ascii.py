@@ -72,6 +72,8 @@ class OdriveAsciiDrive(OdriveAxis):
         return self.entry.port
 
     def greet(self, talk: Talk) -> DriveFacts:
+        """Check the firmware of this ODrive, and that its answers come soon enough; it is idle afterwards. Raises
+        Problem E402 to E404."""
         self._state, self._turn, self.steps = None, 0, (TURN * DIGITS, TURN * DIGITS)
         self._written.clear()
         if not isinstance(talk.line, OdriveLines):
@@ -106,6 +108,7 @@ class OdriveAsciiDrive(OdriveAxis):
         raise self.wrong(f"it answers each time differently what `{path}` is", "look at the cable of its line")
 
     def _property(self, talk: Talk, path: str) -> str:
+        """The text of a property that is a number, asked for until it is answered. Raises Problem E402, E403."""
         self._answered.pop(path, None)
         for _ in range(ASKS):
             talk.send([self._text(f"r {path}")])
@@ -148,6 +151,7 @@ class OdriveAsciiDrive(OdriveAxis):
         return self._text(f"v 0 {own:.7f} 0" if self.rates else f"c 0 {own:.7f}")
 
     def armed(self) -> Sequence[CanFrame]:
+        """Frames that set the mode, command 0, and close the loop."""
         return (
             *(
                 self._text(f"w {path} {value}")
@@ -159,6 +163,8 @@ class OdriveAsciiDrive(OdriveAxis):
         )
 
     def command(self, value: float) -> Sequence[CanFrame]:
+        """Frames of an exchange: the command, N m or rad/s, the question for angle and rate, and one for state, supply
+        or a check in turn."""
         self._turn += 1
         asks: tuple[str, ...] = (STATE,)
         if self._turn % 2 == 0 and self._checks.doubtful:  # while the command before is still in force
@@ -187,6 +193,8 @@ class OdriveAsciiDrive(OdriveAxis):
         return (self._text("-1000.000000 -1000.000000"), self._text("16777216"))
 
     def take(self, frame: CanFrame) -> bool:
+        """Take an answer of this axis, with its question: angle and rate, or a property's value. Returns whether it is
+        its and new."""
         if frame.id != self.node:
             return False
         question, _, answer = frame.data.decode("ascii", "replace").partition("\n")
@@ -209,7 +217,8 @@ class OdriveAsciiDrive(OdriveAxis):
         return True
 
     def _judge(self, path: str, value: float, time: float) -> None:
-        """Take its state, and where that is not that of driving, its errors with it, which are asked after it."""
+        """Take the drive's state; where it does not drive, also its errors, which are asked for after it. time: of the
+        frame, s"""
         if not math.isfinite(value) or value != int(value):
             return
         if path != STATE:

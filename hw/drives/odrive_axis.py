@@ -88,7 +88,8 @@ class OdriveAxis(CanDrive):
             self._write(talk, path, value)
 
     def _check(self, value: float, time: float) -> None:
-        """Take what it says that it was told, at a time of the line's clock, s."""
+        """Take the drive's answer to what command it has; one that this host did not send is another master's. time: of
+        the line's clock, s"""
         if what := self._checks.answered(value, time):
             self.disturbed = f"{self.words} was commanded by another: {what}"
 
@@ -119,8 +120,8 @@ class OdriveAxis(CanDrive):
             raise self.other(f"its firmware is {words}", "MET speaks to firmware 0.6")
 
     def _described(self, talk: Talk, firmware: str, hardware: str) -> DriveFacts:
-        """Set its watchdog, its mode and its largest torque, and read its limits and what its rate loop is. Raises
-        Problem E402 to E404.
+        """Set the drive's watchdog, mode and largest torque, and read its limits and its rate loop. Raises Problem E402
+        to E404.
 
         The largest torque is set whatever it is told, for it stays until the drive is switched off: a bench that is
         told torques would else keep that of the one that was told rates before.
@@ -155,7 +156,7 @@ class OdriveAxis(CanDrive):
 
     @property
     def _bears(self) -> float:
-        """The largest torque that the bench bears of it, N m."""
+        """The largest torque that the bench bears from this drive, N m."""
         figures = self.entry.figures
         return figures["torque_max"] if self.entry.role == "drive" else figures["kt"] * figures["current_max"]
 
@@ -167,7 +168,7 @@ class OdriveAxis(CanDrive):
         return gain, integral
 
     def _says(self, errors: int, state: int, time: float) -> None:
-        """Take its errors and its state, as its numbers have them, said at a time of the line's clock, s."""
+        """Take the drive's errors (bits) and state (its number). time: of the line's clock, s"""
         self.stated = time
         self.errors = ", ".join(words for bit, words in ERRORS.items() if errors & bit)
         if errors & ~sum(ERRORS):

@@ -74,6 +74,7 @@ def checked(line: bytes) -> bytes | None:
 
 
 def _sum(text: bytes) -> int:
+    """The checksum of a line: all of its bytes by exclusive or."""
     checksum = 0
     for byte in text:
         checksum ^= byte
@@ -81,15 +82,15 @@ def _sum(text: bytes) -> int:
 
 
 def answer_time(text: bytes, answer: bytes, baud: int | None) -> float:
-    """Time that a question and its answer are reckoned to take, s. baud: bits a second of a UART; None: USB"""
+    """Estimated time of a question and its answer on the line, s. baud: bits a second of a UART; None: USB."""
     if baud is None:
         return USB_ANSWER
     return BITS * (len(summed(text)) + len(summed(answer)) + 1) / baud + UART_TURN
 
 
 def on_lines(frames: Iterable[CanFrame], baud: int | None) -> float:
-    """Time that questions and answers of an exchange are reckoned to take, s: of the drive that takes longer, both
-    having a line of their own."""
+    """Estimated time of an exchange's questions and answers, s: that of the slower drive, as each has a line of its
+    own."""
     time_of: dict[int, float] = {}
     for frame in frames:
         asks = frame.data.startswith((FEEDBACK, PROPERTY))
@@ -203,6 +204,8 @@ class OdriveLines:
         self._ask(frame.id, self.now())
 
     def receive(self, until: float) -> CanFrame | None:
+        """The next answer that comes before the time `until`, s, asking the drives their next questions meanwhile; None
+        where none does."""
         while not self._frames:
             frame = self._wires.receive(-1.0)
             if frame is None:  # no unread input: an overdue answer is late because of the drive

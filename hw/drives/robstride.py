@@ -115,6 +115,8 @@ class RobstrideDrive(CanDrive):
         """Angle of its last answer, in counts, and its time, s."""
 
     def greet(self, talk: Talk) -> DriveFacts:
+        """Read the identity, firmware and limits of this drive, and set its mode and watchdog; it is idle afterwards.
+        Raises Problem E402 to E404."""
         self._identity, self._faults = None, 0
         if not 0 < self.node <= 127:
             raise self.wrong("its number is none of a RobStride", "a number from 1 to 127")
@@ -259,6 +261,8 @@ class RobstrideDrive(CanDrive):
         return (CanFrame(FEEDBACK << 24 | self.node << 8 | HOST, bytes(8), extended=True),)
 
     def take(self, frame: CanFrame) -> bool:
+        """Take an answer of this drive: identity, parameter, fault, or angle, rate and mode. Returns whether the frame
+        is one and new."""
         data = frame.data
         if not frame.extended or frame.fd or frame.remote or len(data) != 8 or frame.id >> 8 & 0xFF != self.node:
             return False
@@ -306,6 +310,7 @@ class RobstrideDrive(CanDrive):
         self.reading = DriveReading(time, self.own(value_of(angle, ANGLE_MAX, STEPS_16)), self.own(turned))
 
     def _state(self, mode: int, faults: int, time: float) -> None:
+        """Take the mode and the faults of an answer as the drive's state. time: of the frame, s"""
         self.stated = time
         faults_named = [words for bit, words in FAULTS.items() if self._faults & bit]
         faults_named += [words for bit, words in FEEDBACK_FAULTS.items() if faults & bit and words not in faults_named]

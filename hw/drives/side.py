@@ -93,9 +93,9 @@ class Side:
 
 
 def agree(sides: tuple[Side, Side], readings: tuple[DriveReading, DriveReading], acceleration: float) -> bool:
-    """True where two drives on one shaft say the same of it, at once, and go on from before: their angles and rates
+    """True where both drives on one shaft say the same of it at the same time, and go on from before: angles and rates
     differ by no more than the largest acceleration (rad/s^2) makes of the time between their samples, and by the steps
-    in which they are told."""
+    in which the drives count."""
     (first_side, other), (first, second) = sides, readings
     apart, unsure = abs(first.time - second.time), first.time_unsure + second.time_unsure
     if apart > APART + unsure or not (first_side.goes_on(first, acceleration) and other.goes_on(second, acceleration)):

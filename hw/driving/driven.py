@@ -28,6 +28,7 @@ class CaseKernel:
     """
 
     def __init__(self, prepared: Prepared, row: int, repeats: int = 1) -> None:
+        """Prepare the case's kernel, not stepped yet, with its inputs from the case table."""
         self.prepared, self.row = prepared, row
         program, schedule = prepared.program, prepared.experiment.structure.schedule
         self.joints = substituted(prepared)
@@ -86,6 +87,8 @@ class CaseKernel:
         return rows, self.block.outputs[:, 0].copy(), done
 
     def _recorded(self, rows: np.ndarray, record: int, first: int, last: int) -> int:
+        """Run the kernel's ticks from `first` to `last`, and put the rows into `rows`; returns `last`. record: ticks a
+        row"""
         recorded = self.block.recorded(first, last)[0]
         if len(rows):
             start = (first + record - 1) // record

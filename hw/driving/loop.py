@@ -98,6 +98,12 @@ def _driven(
     stop_requested: Callable[[], bool],
     armed: bool,
 ) -> LoopEnd:
+    """Run the loop over beds that are armed, or only read, and record each of their samples; returns after how many
+    exchanges it ended, and why where that was before the last.
+
+    compute  takes the number of the exchange, the rates read (rad/s) and the list of commands, which it changes
+    pace     of the exchanges;  put: takes a packed record
+    """
     clock, packed = time.perf_counter_ns, records.packed
     period = round(pace.period * 1e9)
     if armed and stop_requested():

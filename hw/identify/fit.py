@@ -72,9 +72,12 @@ class FitResult:
 
 
 def fitted(series: Series, groups: Sequence[int], start: Mapping[str, float]) -> FitResult:
-    """groups: of each move, from 0 on;  start: parameters to begin with, of `MOTOR`. One that the moves do not tell
-    stays what it is there: `kt_load`, unless the drive motor's current was measured; `tau_max` and `f_v`, where the
-    drive was never at its largest torque.
+    """The parameters of a bed (a motor and a load on one shaft) with which its model reads what the moves measured.
+
+    groups  of each move, from 0 on;  start: parameters to begin with, of `MOTOR`
+
+    A parameter that the moves do not tell keeps its start: `kt_load`, unless the drive motor's current was measured;
+    `tau_max` and `f_v`, where the drive was never at its largest torque.
     """
     measured = series.drive_current is not None
     sought = [name for name in MOTOR if name != "kt_load" or measured]

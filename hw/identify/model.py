@@ -42,6 +42,7 @@ def _kernel(count: int) -> Kernel:
             tape.write(name, 0.0 * tape.input("kt"))
 
     def advance(tape: Tape) -> None:
+        """Record one step of the bed's shaft: rate, filtered rate and its slope after the input `time`, s."""
         p = {name: tape.input(name) for name in PARAMETERS}
         h = tape.input("time") / count
         decay = damping(p["kt"], p["resistance"], p["f_v"]) / p["inertia"]
@@ -64,6 +65,7 @@ def _kernel(count: int) -> Kernel:
             tape.write(name, value)
 
     def read(tape: Tape) -> None:
+        """Give out the filtered rate and the drive motor's current, A."""
         kt, w = tape.input("kt"), tape.read("rate")
         drive = torque(kt, tape.input("resistance"), tape.input("tau_max"), tape.input("voltage"), w)
         tape.output("rate", tape.read("filtered"))

@@ -70,6 +70,7 @@ def _levels(every: float, *levels: tuple[float, float]) -> Callable[[], Profile]
 
 
 def _steps() -> list[Move]:
+    """Moves of two levels of voltage without load, with both signs."""
     pairs = [(0.15, 0.4), (0.3, -0.3), (0.6, 0.2), (0.5, -0.15), (0.25, 0.7), (0.1, -0.12), (0.2, -0.5), (0.35, 0.12)]
     return [
         Move("steps", 0.6, _levels(0.3, (sign * a, 0.0), (sign * b, 0.0))) for a, b in pairs for sign in (1.0, -1.0)
@@ -77,6 +78,7 @@ def _steps() -> list[Move]:
 
 
 def _loaded() -> Iterator[Move]:
+    """Moves at one voltage under several currents of the load."""
     for volts, amperes in [(0.3, 0.5), (0.5, -0.6), (0.15, 0.35), (0.4, 0.25)]:
         for sign in (1.0, -1.0):
             v, a = sign * volts, sign * amperes
@@ -87,6 +89,8 @@ def _slow() -> Iterator[Move]:
     """Slow sines of the voltage, and of the current, through rest: for dry friction and misalignment."""
 
     def ramps(volts: float, amperes: float, time: float) -> Callable[[], Profile]:
+        """A move's profile: one slow sine of voltage and current through rest, `time` s long."""
+
         def profile(t: float, w: float) -> tuple[float, float]:
             turn = math.sin(2.0 * math.pi * t / time)
             return volts * turn, amperes * turn
@@ -107,7 +111,10 @@ def _limited(top: float) -> list[Move]:
     loads."""
 
     def relay(sign: float, load: float, low: float, high: float) -> Callable[[], Profile]:
+        """A move's profile that switches the drive on and off, so that the rate stays between `low` and `high`."""
+
         def new_profile() -> Profile:
+            """The profile of one run of the move, which begins with the drive on."""
             up = True
 
             def profile(t: float, w: float) -> tuple[float, float]:
@@ -130,7 +137,12 @@ def _mixed() -> list[Move]:
     """Sums of three sines of the voltage and two of the current, for several sets of frequencies, both ways."""
 
     def sines(volts: Sequence[float], amperes: Sequence[float], hertz: Sequence[float]) -> Callable[[], Profile]:
+        """A move's profile of sines: three of the voltage and the others of the current, with these amplitudes and
+        frequencies."""
+
         def profile(t: float, w: float) -> tuple[float, float]:
+            """Shares of the largest voltage and current at time t, s, after the move's begin. w: rate of the shaft, not
+            used"""
             waves = [math.sin(2.0 * math.pi * f * t) for f in hertz]
             return (
                 sum(a * wave for a, wave in zip(volts, waves[:3], strict=True)),
@@ -174,6 +186,8 @@ class MoveGuide:
         return sum(math.ceil((move.time + PATIENCE) / self._period) + 1 for move in self._moves) + 1
 
     def __call__(self, e: int, rates: Sequence[float], commands: list[list[float]]) -> None:
+        """Set the commands of exchange `e`: of the move under way, with limited slews, or of the rest before the
+        next."""
         rate, wanted = rates[0], (0.0, 0.0)
         if self._profile is None:
             self._rest(e, rate, commands[0])

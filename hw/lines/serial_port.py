@@ -57,6 +57,7 @@ class SerialLine(HostClock):
     """
 
     def __init__(self, url: str, baud: int, to: str = "the bed", lost: Sequence[str] = LOST) -> None:
+        """Open the line for this process alone. baud: bits a second. Raises Problem E400."""
         self._url, self._to, self._helps = url, to, tuple(lost)
         local = "://" not in url
         try:
@@ -92,6 +93,7 @@ class SerialLine(HostClock):
             raise self._lost(reason) from None
 
     def receive(self, until: float) -> bytes:
+        """The bytes that come before the time `until`, s; none where none do. Raises Problem E401."""
         port = self._port
         try:
             if self._file is not None:
@@ -121,6 +123,7 @@ class SerialLine(HostClock):
 
 
 def _opened(url: str, baud: int) -> Any:
+    """The port of a URL or device, open. Raises OSError, ValueError and what pyserial raises."""
     if url.startswith(_UNIX):
         return _UnixSocket(url.removeprefix(_UNIX))
     _check_address(url)
@@ -215,6 +218,7 @@ def _is_ours(path: str) -> bool:
 
 
 def _ports() -> str:
+    """The serial devices of this machine, in words."""
     from serial.tools.list_ports import comports
 
     devices = [port.device for port in comports()]

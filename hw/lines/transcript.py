@@ -103,6 +103,7 @@ class TranscribedLine(LineOverLine):
         self._add(OPENED, b"")
 
     def send(self, frame: bytes) -> None:
+        """Send bytes, and put them into the transcript, also where the line is lost."""
         try:
             self._line.send(frame)
         except Problem as lost:
@@ -112,6 +113,7 @@ class TranscribedLine(LineOverLine):
         self._add(SENT, frame)
 
     def receive(self, until: float) -> bytes:
+        """The bytes that come before the time `until`, s, put into the transcript."""
         try:
             data = self._line.receive(until)
         except Problem as lost:
@@ -125,6 +127,7 @@ class TranscribedLine(LineOverLine):
         self._add(LOST, lost.diagnostics[0].message.encode())
 
     def _add(self, kind: int, data: bytes) -> None:
+        """Add a record to the transcript. Raises Problem E409, once, where it cannot be written."""
         if not self._writing:
             return
         try:

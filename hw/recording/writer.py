@@ -57,6 +57,7 @@ class RecordsWriter:
     """The process that writes the records of a run, from the loop's side."""
 
     def __init__(self, through: Ring, path: Path, head: bytes) -> None:
+        """Start the process. through: the ring that the loop fills; path: of the file; head: its first bytes, JSON"""
         self._ring, self._path, self._count = through, path, 0
         read, self._alive = os.pipe()
         os.set_inheritable(self._alive, False)

@@ -54,6 +54,8 @@ class DefinitionChecks:
     """The checks of a deck's definitions: known findings at once, the others one by one."""
 
     def __init__(self, deck: Deck, known: Known) -> None:
+        """Find the deck's definitions, and those whose findings are known. known: findings by the digest of all that
+        they depend on"""
         self._deck = deck
         self._complaints = Complaints(deck.warnings)
         self._complaints.note_unreadable(deck.unreadable)
@@ -76,7 +78,8 @@ class DefinitionChecks:
         return len(self._waiting)
 
     def check_next(self) -> None:
-        """Check one more definition."""
+        """Check the next definition (an arm, a servo, a run or a sweep) whose findings are not known, and keep its
+        findings."""
         n = self._waiting.pop(0)
         complaints = self._complaints.apart()
         allowances: tuple[tuple[Allowance, ...], ...] = ()
@@ -147,6 +150,7 @@ class DefinitionChecks:
     def _experiment(
         self, definition: Definition, definitions: Definitions, complaints: Complaints
     ) -> tuple[tuple[Allowance, ...], ...]:
+        """Check a run or sweep; returns the allowances of its experiments."""
         source = DeckSource(definitions, complaints, partial(read_again, self._deck), audited=False)
         return tuple(experiment.allowances for experiment, _ in experiments_of(source, definition))
 
@@ -173,6 +177,7 @@ class _Keys:
     """Digests of everything on which a definition's findings depend."""
 
     def __init__(self, deck: Deck, definitions: Definitions, complaints: Complaints) -> None:
+        """Digest what many definitions share: the deck's `let`s, its arms and its servos."""
         self._known = {
             name: definition for kind in EXPERIMENTS for name, definition in definitions.of_kind(kind).items()
         }
@@ -244,6 +249,7 @@ def _chooses_macros(entries: Iterable[Entry]) -> bool:
 
 
 def _digest(parts: Iterable[bytes]) -> bytes:
+    """The SHA-256 of these parts, each behind its length, so that two lists never give the same bytes."""
     digest = hashlib.sha256()
     for part in parts:
         digest.update(len(part).to_bytes(8, "big") + part)

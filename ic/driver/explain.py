@@ -99,7 +99,8 @@ def with_all_settings(compiled: Compiled, number: int = 0) -> Experiment:
 
 
 def explanations_of(compiled: Compiled, target: str) -> Iterator[Explanation]:
-    """The explanations of a compiled deck."""
+    """Where each value of the path `target` comes from, in every experiment of a compiled deck; of a vector, each
+    component."""
     assert compiled.plan is not None
     for experiment, scope in zip(compiled.plan.experiments, compiled.scopes, strict=True):
         paths = dict.fromkeys((target, *scope.known.get(target, ())))

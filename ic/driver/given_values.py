@@ -225,6 +225,7 @@ def swept_run(
 
 
 def _run_of_deck(deck: Deck, name: str, defines: tuple[str, ...], settings: tuple[str, ...]) -> GivenRun:
+    """The run of this name, compiled. Raises Problem where the deck has a mistake."""
     compiled = compile_deck(deck, select=name, defines=defines, settings=settings)
     if compiled.plan is None:
         raise Problem(_errors(compiled), compiled.sources)

@@ -207,6 +207,8 @@ def _difference(path: str, before: Compiled, new: Mapping[str, str], parts: str 
 
 
 def _left(path: str, why: str, diagnostic: Diagnostic | None = None, *, parts: str = "") -> Diagnostic:
+    """The error that a deck stays in its edition (E346). why: in words; parts: the file that includes `path`, if there
+    is one."""
     message = f"`{parts or path}` stays in its edition: " + (f"in `{path}`, which includes it, " * bool(parts)) + why
     if diagnostic is None and parts:
         return error("E346", message, help=f"`met check {path}` may warn of what the editions read otherwise (D392)")

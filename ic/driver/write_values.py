@@ -209,6 +209,7 @@ def _word(group: Group) -> str:
 
 
 def _why(copy: _Copy, place: Place | None, home: str) -> str:
+    """The reason why a value cannot be written into the deck's text at this place, in words."""
     if place is None:
         return f"it stands in no place of its own, and no `servo {home} {{ ... }}` of this deck can have it"
     if place.macros:
@@ -221,6 +222,7 @@ def _why(copy: _Copy, place: Place | None, home: str) -> str:
 
 
 def _by_hand(value: WrittenValue, why: str) -> Problem:
+    """The error that a value cannot be written into the deck (E397), with what to write by hand."""
     home, _, rest = value.path.rpartition(".")
     write = f"`{rest} = {value.text};` in what `{home}` is" if home else f"`{rest} = {value.text}`"
     helps = [f"write it by hand: {write}", f"or leave the deck as it is, and run it with `--set '{value.setting}'`"]
@@ -252,6 +254,8 @@ def _extent(source: Text, entry: Entry) -> tuple[int, int]:
 
 
 def _replaced(source: Text, place: Place, value: WrittenValue, remark: str) -> str:
+    """The deck's text with a value in place of the one at a place, in the unit that stands there. remark: the comment
+    that is put behind it."""
     text, first = source.text, _offset(source, place)
     last = first + place.length
     literal = _LITERAL.fullmatch(text[first:last])

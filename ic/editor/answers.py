@@ -215,6 +215,7 @@ class AskedPosition:
         return Files(self._checks.include_dirs, unsaved=self._checks.unsaved())
 
     def _found_file(self) -> FoundFile:
+        """The file of the open text, from which includes are looked for."""
         if self._path is None:
             return FoundFile("", "")
         inside = os.path.relpath(self._path, LIBRARY)
@@ -264,17 +265,20 @@ def _of_key(token: Token, entry: TextEntry | None, names: NamesInTexts) -> Itera
 
 
 def _of_model(token: Token) -> Iterator[str]:
+    """A line about each model of this name."""
     for kind, model in models_called(token.text).items():
         yield f"{kind} model `{token.text}`: {summary(model)}"
 
 
 def _of_unit(text: DeckText, token: Token) -> Iterator[str]:
+    """A line about the unit that a word is behind a number or another unit."""
     unit = UNITS.get(token.text)
     if unit is not None and text.may_be_unit(token):
         yield f"unit `{token.text}`: {unit.word}, {unit.measure.scale:g} in SI"
 
 
 def _of_name(text: DeckText, token: Token, names: NamesInTexts, index: DeckIndex) -> Iterator[str]:
+    """The definitions that a name may mean, each with its line of the deck."""
     for definition in names.meant_in(text, token)[:2] if token.kind == NAME else ():
         source = definition.token.source
         line = source.text.split("\n")[source.line(definition.token.offset) - 1].strip()
@@ -305,6 +309,7 @@ def _lines(token: Token, entry: TextEntry | None) -> tuple[tuple[int, int], tupl
 
 
 def _is_at(place: Place, file: str, lines: tuple[tuple[int, int], tuple[int, int]], token: Token) -> bool:
+    """True where a place, or the one that a macro came from, is in these lines of the file."""
     return any(
         seen_place.file == file and lines[0] <= (seen_place.line, seen_place.column) < lines[1]
         for seen_place in {place, shown_place(place)}

@@ -34,7 +34,8 @@ def _warm_up() -> None:
 
 
 def serve(connection: socket.socket) -> None:
-    """Take requests until the server has gone."""
+    """Answer the editor's requests, each in a forked process of its own that the next request ends, until the server
+    has gone."""
     child = 0
     while True:
         head, passed, _, _ = socket.recv_fds(connection, 1, 2)

@@ -152,6 +152,8 @@ def compiled_with_reply(
     kept_at = time.monotonic()
 
     def keep_so_far() -> None:
+        """Hand over the answers of the analysis found so far, if that was not done for a while, in case the check is
+        stopped."""
         nonlocal kept_at
         if time.monotonic() - kept_at > DEAR:
             keep(FoundAnswers(pickle.dumps(memo.so_far, pickle.HIGHEST_PROTOCOL)))
@@ -174,6 +176,7 @@ def compiled_with_reply(
 def _reply(
     diagnostics: tuple[Diagnostic, ...], sources: Mapping[str, str], *, known: Known | None = None, audited: bool = True
 ) -> CheckReply:
+    """The answer of a check to the server, with the edits that carry out each diagnostic's help."""
     from met.messages.edits import edits
 
     return CheckReply(

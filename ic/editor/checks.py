@@ -96,6 +96,8 @@ class DeckChecks:
         include_dirs: Iterable[str] = (),
         defines: Iterable[str] = (),
     ) -> None:
+        """process: checks decks, beside the server; tell: shows what is known of checked decks; log: takes lines for
+        the editor's log"""
         self._process, self._tell, self._log, self._refresh = process, tell, log, refresh
         self.include_dirs, self.defines = tuple(include_dirs), tuple(defines)
         self.texts: dict[str, OpenText] = {}
@@ -190,7 +192,7 @@ class DeckChecks:
             self._resting.set()
 
     async def _check_all(self) -> None:
-        """Check decks until none has changed."""
+        """Check changed decks, each once its text has rested for a moment, until no change is left unchecked."""
         while (uri := self._next()) is not None:
             pause = self._due - time.monotonic()
             if pause > 0:
@@ -207,6 +209,7 @@ class DeckChecks:
         self._log(f"this is a defect of MET; please report it:\n{traceback.format_exc()}")
 
     def _changed(self, identities: Iterable[str]) -> None:
+        """Mark the decks to be checked again that are, or read, one of these files."""
         changed = set(identities)
         for uri, text in self.texts.items():
             checked = self.checked.get(uri)
@@ -214,6 +217,7 @@ class DeckChecks:
                 self._make_stale(uri)
 
     def _make_stale(self, uri: str) -> None:
+        """Mark a deck as to be checked again, after a pause; a check of it that runs is stopped."""
         self._stale.pop(uri, None)
         self._stale[uri] = None
         self._due = time.monotonic() + PAUSE
@@ -254,6 +258,8 @@ class DeckChecks:
         return waiting[-1] if waiting else None
 
     async def _check(self, uri: str) -> None:
+        """Run one check of an open deck in the checker's process, and take its answers one by one; a change of the
+        deck's texts ends it. A deck whose check ends without an answer is noted as failed."""
         deck = self.texts[uri]
         texts, request = dict(self.texts), self.request(deck)
         self._running, self._outdated, self._auditing = uri, False, False
@@ -343,9 +349,12 @@ def carried_over(last: CheckReply, now: CheckReply) -> CheckReply:
     moved = {name: _MovedLines(last.sources[name], text) for name, text in now.sources.items() if name in last.sources}
 
     def line(file: str, number: int) -> int:
+        """The present number of a line of a file. Raises _Changed where the line was changed."""
         return moved[file].line(number) if file in moved else number
 
     def place(old: Place) -> Place:
+        """A place in the texts as they are now, with the places that it came through. Raises _Changed where a line was
+        changed."""
         return replace(
             old,
             line=line(old.file, old.line),

@@ -122,6 +122,7 @@ def _settled_text(settled: Settled) -> str:
 
 
 def _text(value: float | tuple[float, ...] | str | None, unit: str) -> str:
+    """A value in words for hover and completion, with its unit; None is a value that varies with the case."""
     if value is None:
         return f"in {unit}, and varies with the case" if unit not in ("", "1") else "varies with the case"
     if isinstance(value, str):
@@ -133,6 +134,7 @@ def _text(value: float | tuple[float, ...] | str | None, unit: str) -> str:
 
 
 def _origins(settled: Settled, run: str) -> Iterator[str]:
+    """Lines about where a settled value is from, and what it overrides. run: its name"""
     origin = settled.origin
     words = {"case": "a sweep varies it", "default": "the default", "derived": "computed"}.get(origin.kind, "")
     note = ", ".join(part for part in (words, origin.note) if part)

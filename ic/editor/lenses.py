@@ -69,6 +69,7 @@ def lenses(
 
 
 def _title(cases: int | None, last: LastRun | None) -> str:
+    """The words above a run: the number of its cases, and the time that they take by the last run."""
     words = [f"{cases} case" + ("s" if cases != 1 else "")] if cases is not None else []
     if cases is not None and last is not None and last.seconds is not None and last.cases:
         words.append(f"about {_duration(last.seconds * cases / last.cases)}, after the last run")

@@ -150,6 +150,7 @@ class MacrosInTexts:
         return self._bodies[key]
 
     def _around_use(self, macro: TextMacro) -> TextEntry | None:
+        """The entry of the deck in which the macro is first used; None where it is not used."""
         text, use = self._uses.get(macro.name.text, (None, None))
         if text is None or use is None:
             return None
@@ -410,6 +411,7 @@ class NamesInTexts:
         return declared
 
     def _defined(self, text: DeckText) -> Iterator[NameInText]:
+        """The names that a text defines: blocks, decks that it uses, macros, and what its macros expand to."""
         yield from _named(text.all_entries(), by_macro=False)
         yield from (NameInText("roof", use.roof, None) for use in text.uses)
         parameters = {parameter.text for macro in text.macros for parameter in macro.parameters or ()}
@@ -437,6 +439,7 @@ def entry_of(parameter: Parameter) -> Entry:
 
 
 def _named(entries: Iterable[TextEntry], by_macro: bool) -> Iterator[NameInText]:
+    """The names that these entries define. by_macro: whether the entries are from a macro's expansion"""
     for entry in entries:
         name = entry.named
         if name is not None:

@@ -86,6 +86,7 @@ def _folded_comments(comments: list[Token], line: Callable[[int], int]) -> Itera
 
 
 def _folded_conditionals(text: DeckText, line: Callable[[int], int]) -> Iterator[Fold]:
+    """The stretches between `#if`, `#else` and `#endif`, as numbers of their first and last lines."""
     opened: list[int] = []
     for directive in text.directives:
         line_number = line(directive.tokens[0].offset) - 1

@@ -162,6 +162,7 @@ def _renamed(rename_request: RenameRequest) -> Renamed:
 
 
 def _refuse_outside(use: Token, path: str, roots: Iterable[str]) -> None:
+    """Raise NotRenamed for a use in the standard library, or in a file outside of the open folders."""
     if use.source.name.startswith("<"):
         raise NotRenamed(f"`{use.text}` is used in {use.source.name}, which comes with MET")
     if path and not any(os.path.commonpath([path, root]) == root for root in roots):

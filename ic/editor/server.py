@@ -75,6 +75,7 @@ class DeckServer(LanguageServer):
             self._worker = asyncio.create_task(self.checks.work())
 
     def _take_options(self, settings: Any) -> None:
+        """Take the editor's options, and warn of those that there are not or that are of a wrong type."""
         options = settings if isinstance(settings, dict) else {}
         for name in options.keys() - set(OPTIONS):
             self._warn(f"no option `{name}`; there are: {', '.join(OPTIONS)}")

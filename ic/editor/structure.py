@@ -305,6 +305,8 @@ class TextMacro:
 
 
 def _macro(line: TextDirective) -> TextMacro | None:
+    """The macro that a `#define` defines, with its parameters (None: it has no brackets) and body; None for another
+    directive."""
     tokens = line.tokens
     if line.name != "define" or len(tokens) < 3 or tokens[2].kind != NAME:
         return None

@@ -117,6 +117,8 @@ class AlignedLine:
         self._columns: dict[Anchor, dict[int, int]] = {}
 
     def columns(self, anchor: Anchor) -> dict[int, int]:
+        """The places at which the line's pieces could be aligned, as columns from its first piece, each with the
+        piece's index. anchor: the part of a piece that is aligned."""
         if anchor not in self._columns:
             columns: dict[int, int] = {}
             start = self.pieces[0].column
@@ -134,6 +136,7 @@ def lines_of(all_rows: Sequence[Row]) -> dict[int, AlignedLine]:
 
 
 def _families(pieces: Sequence[RowPiece]) -> Iterator[tuple[int, str]]:
+    """For each piece of a line how deep it is in brackets, and the family of pieces with which it may be aligned."""
     depth, before = 0, ""
     for piece in pieces:
         depth -= piece.kind == "close"
@@ -143,6 +146,7 @@ def _families(pieces: Sequence[RowPiece]) -> Iterator[tuple[int, str]]:
 
 
 def _family(piece: RowPiece) -> str:
+    """The family of pieces with which a piece may be aligned, such as "=" or "value"."""
     if piece.text in ("=", "+=", "{"):
         return "="
     if piece.text in COMPARISONS:

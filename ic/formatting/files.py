@@ -41,6 +41,7 @@ def making_strings(text: str, file: FoundFile) -> frozenset[str]:
 
 
 def _defined(source: Text) -> Iterator[str]:
+    """The macros of a text that make a string of an argument."""
     for line in logical_lines(source):
         tokens = [token for token in line if token.text.strip()]
         if [token.text for token in tokens[:2]] == ["#", "define"] and _makes_a_string(tokens[2:]):
@@ -52,6 +53,7 @@ def _makes_a_string(definition: list[Token]) -> bool:
 
 
 def _included(text: str, file: FoundFile, files: Files) -> Iterator[FoundFile]:
+    """The files that a text includes, as far as they are found."""
     for line in text.split("\n"):
         written = _INCLUDE.match(line)
         if written is not None:
@@ -121,6 +123,8 @@ def decks(paths: Sequence[str]) -> list[str]:
 
 
 def _inside(folder: str) -> Iterator[str]:
+    """The deck files in a folder and in its folders, but for hidden ones. Raises OSError."""
+
     def refuse(reason: OSError) -> None:
         raise reason
 
@@ -152,6 +156,8 @@ def lay_out_text(path: str, text: str) -> str:
 
 
 def _laid_out(file: FoundFile, data: bytes, new: str | None = None) -> LaidOut:
+    """A deck file with its formatted text. data: the file's bytes; new: the text to format in their place. Raises
+    Problem D018 for one that is too large."""
     if len(data) > MOST_BYTES:
         raise Problem(error("D018", f"`{file.name}` has more than the {MOST_BYTES >> 20} MiB that a deck may have"))
     text, complaint = decode(data, file.name, "deck")

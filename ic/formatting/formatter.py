@@ -66,7 +66,7 @@ MOST_BLANK = 2  # lines at the top level; within a bracket it is one
 
 
 def laid_out(rows: Sequence[Row]) -> str:
-    """The formatted text of these rows."""
+    """The text of these rows as `met fmt` writes it: indented, aligned, and with few blank lines."""
     columns = _columns(rows)
     tails = _tails(rows, columns)
     keep = any(token.text == "__LINE__" for row in rows for token in row.tokens)  # which counts blank lines too
@@ -90,6 +90,7 @@ def _most_blank(above: Row | None, row: Row) -> int:
 
 
 def _text(row: Row, columns: Sequence[int], tail: int) -> str:
+    """The text of a row, its pieces at these columns, and its comment at column `tail`."""
     if row.exact:
         return "\n".join(line.rstrip(BLANKS) for line in row.raw.split("\n"))
     if row.kind == REMARK:

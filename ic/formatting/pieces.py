@@ -202,6 +202,7 @@ def _wanted(before: RowPiece, piece: RowPiece) -> int | None:
 
 
 def _around_brace(before: RowPiece, piece: RowPiece) -> int | None:
+    """The blanks between two pieces of which one is a brace of a name."""
     if before.text == "{" or piece.text == "}":
         return 1
     if piece.text == "{":

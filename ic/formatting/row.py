@@ -79,6 +79,7 @@ class Row:
     )
 
     def __init__(self, source: Text, start: int, line: Sequence[Token], tab: int) -> None:
+        """start: the line's offset in the text; line: its tokens; tab: columns from one tab stop to the next"""
         self.start = start
         self.tab = tab
         self.raw = source.text[start : line[-1].offset]

@@ -127,6 +127,8 @@ def whole(tokens: Sequence[Token], position: int, known: Mapping[str, str], dept
 
 
 def _product(tokens: Sequence[Token], position: int, known: Mapping[str, str], depth: int) -> tuple[int, int]:
+    """The whole number of the product that begins at token `position` (`*`, `/`, `%`), and the position of the token
+    behind it. Raises NotWhole."""
     value, position = _factor(tokens, position, known, depth)
     while tokens[position].text in ("*", "/", "%"):
         sign = tokens[position]
@@ -145,6 +147,8 @@ def _product(tokens: Sequence[Token], position: int, known: Mapping[str, str], d
 
 
 def _factor(tokens: Sequence[Token], position: int, known: Mapping[str, str], depth: int) -> tuple[int, int]:
+    """The whole number of the factor at token `position` (a number, a name in `known`, a sign or brackets), and the
+    position of the token behind it. depth: of signs and brackets around it. Raises NotWhole."""
     token = tokens[position]
     if depth > CONDITION_NESTING:
         raise NotWhole(token, f"signs and brackets go deeper than {CONDITION_NESTING} here")

@@ -28,6 +28,7 @@ class EndedInsideBlock(Exception):
 
 
 def token_in_words(token: Token) -> str:
+    """A token as messages name it, cut where it is long."""
     if token.kind == END:
         return "the end of the deck" if token.source.name != COMMAND_LINE else "the end of the line"
     text = token.text if len(token.text) <= SHOWN else token.text[: SHOWN - 3] + "..."
@@ -46,6 +47,7 @@ def span(first: Token, last: Token) -> Place:
 
 class Cursor:
     def __init__(self, tokens: Sequence[Token], findings: Findings) -> None:
+        """tokens: of the deck, the last of kind END; findings: where mistakes are reported"""
         last = tokens[-1]
         assert last.kind == END
         # looking two tokens ahead never needs a check
@@ -92,6 +94,7 @@ class Cursor:
         also: Iterable[Label] = (),
         help: str | Iterable[str] = (),
     ) -> None:
+        """Report an error at a token or place, and go on."""
         self.findings.error(
             code, message, place.place if isinstance(place, Token) else place, also=also, help=help or ()
         )
@@ -105,6 +108,7 @@ class Cursor:
         also: Iterable[Label] = (),
         help: str | Iterable[str] = (),
     ) -> NoReturn:
+        """Report an error at a token or place, and raise Unreadable, so that parsing goes on behind this entry."""
         if self.token.kind != BAD:  # such a token has been reported
             self.tell(code, message, place, also=also, help=help)
         raise Unreadable
@@ -144,6 +148,7 @@ class Cursor:
         return self.advance()
 
     def count_operator(self) -> None:
+        """Count an operator of the present expression. Raises GiveUp beyond `MOST_OPERATORS` (D029)."""
         self.operators += 1
         if self.operators > MOST_OPERATORS:
             self.tell(
@@ -168,6 +173,7 @@ class Cursor:
     # lines, as the reader of the deck sees them
 
     def line_of(self, token: Token) -> tuple[str, int]:
+        """The file and line of a token; of one from a macro, those of the macro's use."""
         macros = macro_count(token.expansions)
         if macros:
             use = token.expansions[macros - 1].use

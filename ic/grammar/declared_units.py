@@ -66,6 +66,8 @@ def measures(sizes: Mapping[str, tuple[Token, Expression]], findings: Findings) 
     unsized: set[str] = set()
 
     def find(name: str, within: tuple[str, ...]) -> Measure:
+        """The measure of a unit, computed at the first request. within: the units whose declarations led here. Raises
+        Problem D394 for a unit that needs itself or is too deep in others, Unsized where it has no measure."""
         if name in known:
             return known[name]
         if name in unsized or name not in sizes:
@@ -151,6 +153,7 @@ def _product(measure: Measure, other: Measure, place: Place) -> Measure:
 
 
 def _of_unit(unit: Unit, find: Callable[[str], Measure]) -> Measure:
+    """The measure of a unit of the language or of the deck's own, which `find` gives."""
     measure = ONE
     for word, power in unit.factors:
         known = units.ALL_UNITS.get(word.text)

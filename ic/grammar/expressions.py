@@ -110,6 +110,8 @@ class Expressions(Quantities):
                 self.fail("D033", "comparisons do not chain", self.token, also=(compared,), help=helps)
 
     def prefix(self, least: int) -> Expression:
+        """Read an operand, with the sign or `not` before it. least: the binding strength of what it is part of. Raises
+        Unreadable."""
         token = self.token
         text = token.text
         if text in ("-", "+"):
@@ -125,6 +127,7 @@ class Expressions(Quantities):
         return self.operand()
 
     def in_words(self, token: Token) -> str:
+        """The operator that a sign such as `&&` stands for, `and`; the sign is reported (D020)."""
         word = _WORDS.get(token.text)
         if word is None:
             return token.text
@@ -187,6 +190,7 @@ class Expressions(Quantities):
             self.fail("D020", f"a string has at most {LONGEST_STRING} characters", token)
 
         def plain(match: re.Match[str]) -> str:
+            """The character of an escape in a string; an unknown one is reported (D020)."""
             if match.group(1) not in _ESCAPES:
                 self.tell(
                     "D020",
@@ -323,7 +327,7 @@ class Expressions(Quantities):
             self.fail("D285", f"`{written[:SHOWN]}` within a name stands in a loop alone", place, help=USAGE)
 
     def indexed(self, name: Name, first: Token) -> Indexed:
-        """`lengths[i]`, from the bracket on."""
+        """The element of a list, `lengths[i]`, read from its bracket on."""
         self.enter()
         outer = self.begin_items()
         index = self.value()
@@ -332,6 +336,7 @@ class Expressions(Quantities):
         return Indexed(name, index, span(first, closing))
 
     def list(self) -> List:
+        """Read a list in square brackets, `[1, 2 m]`. Raises Unreadable."""
         opening = self.enter()
         outer = self.begin_items()
         items: list[Expression] = []

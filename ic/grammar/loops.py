@@ -111,6 +111,7 @@ class Loops(Expressions):
         self.peak = max(self.peak, body.peak)
 
     def check_index(self, index: Token) -> None:
+        """Report a loop's index that has a unit's name (D026) or that of a loop around it (D283)."""
         if self.is_reserved(index):
             message = f"`{index.text}` is the unit {units.UNITS[index.text].word}, so it cannot be a loop's index"
             self.tell(
@@ -258,7 +259,8 @@ class Loops(Expressions):
     def tokens_of(
         self, pieces: Sequence[tuple[Token, ...]], iteration: Expansion, known: dict[str, str]
     ) -> list[Token]:
-        """The tokens of an iteration."""
+        """The tokens of a loop's body in one iteration, with the loop's index filled into names with braces. known: the
+        value of each index, by name."""
         through: dict[int, tuple[Expansion, ...]] = {}  # by identity, as of macros
         tokens: list[Token] = []
         for piece in pieces:

@@ -87,8 +87,8 @@ def parse_on(
     declared: Mapping[str, Measure] = NO_UNITS,
     looped: list[int] | None = None,
 ) -> Parsed:
-    """The deck of these tokens; its errors go into the findings. looped: the tokens of all iterations of loops so far,
-    of decks that count together"""
+    """The deck of these tokens; errors go into the findings. looped: tokens of all loops so far, of decks counted
+    together."""
     parser = _Parser(tokens, findings)
     parser.declared = declared
     parser.looped = looped if looped is not None else parser.looped
@@ -200,6 +200,7 @@ class _Parser(Uses):
         return tuple(body)
 
     def never_closed(self) -> NoReturn:
+        """Report the last open bracket as not closed (D022), and raise EndedInsideBlock."""
         also = [Label(self.behind(self.previous), "the deck ends here")]
         opening = self.open[-1]
         if self.misindented is not None:
@@ -231,6 +232,7 @@ class _Parser(Uses):
     # entries
 
     def entry(self) -> Entry:
+        """Read one entry of a deck or block: a `let`, a setting, a group or a statement. Raises Unreadable."""
         start = self.position
         first = self.token
         if first.kind != NAME:
@@ -281,7 +283,7 @@ class _Parser(Uses):
         return self.statement(start, names, tail)
 
     def file_without_quotes(self, names: list[Token]) -> None:
-        """`arm panda from robots/panda.urdf { }`, with or without `urdf` before the name."""
+        """Refuse `arm panda from robots/panda.urdf { }`, a file without quotes. Raises Unreadable."""
         first = self.position if len(names) == 3 else self.position - 1
         last = self.position
         while (
@@ -319,7 +321,7 @@ class _Parser(Uses):
         return self.begins_value() and not self.on_new_line(self.position)
 
     def no_brace(self, names: list[Token]) -> None:
-        """`servo light like strong` without the `{` of its block; its entries are skipped where they follow."""
+        """Report `servo light like strong` without its `{`, and skip what follows of its block. Raises Unreadable."""
         self.tell(
             "D020",
             f"expected `{{` after `{names[-1].text[:40]}`",
@@ -349,6 +351,7 @@ class _Parser(Uses):
         self.fail("D035", message, step.use, help=helps)
 
     def let(self, names: list[Token], tail: list[Token]) -> Let:
+        """The `let` or `param` whose names are read. tail: of a path, which is an error. Raises Unreadable."""
         name = names[1]
         if tail:
             message = f"`{names[0].text}` gives a value to one name, without points"
@@ -385,6 +388,8 @@ class _Parser(Uses):
         return Setting(_words(words), _words(path), operator.text, value, span(names[0], path[-1]))
 
     def group(self, names: list[Token], tail: list[Token]) -> Group:
+        """The block whose names are read, and which begins here. tail: the rest of its base's path. Raises
+        Unreadable."""
         base = _base_at(names)
         self.unopened += [self.behind(a) for a, b in pairwise(names) if self.line_of(a) != self.line_of(b)]
         if tail and (base is None or base + 2 != len(names)):
@@ -443,8 +448,8 @@ class _Parser(Uses):
         return Group(_words(words), None, None, body or (), span(words[0], words[-1]), made_from)
 
     def statement(self, start: int, names: list[Token], tail: list[Token]) -> Statement:
-        """Read a statement such as `require settle < 10 s;`: the text after the names decides which of them belong to
-        the value."""
+        """Read a statement such as `require settle < 10 s;`: what follows the names says which of them are in its
+        value."""
         token = self.token
         count = _words_before_value(names, bool(tail), token)
         if count == 0 or (count == len(names) and not (self.begins_value() or token.text in ("-", "+", "!"))):
@@ -467,8 +472,7 @@ class _Parser(Uses):
         return Statement(_words(names[:1]), value, span(names[0], names[-1]), _word(names[1]))
 
     def over_cases(self, comparison: Expression) -> Expression:
-        """Read `in SHARE of cases` and `with CONFIDENCE confidence`, one of them or both, after an optional
-        comparison."""
+        """Read `in SHARE of cases` and `with CONFIDENCE confidence`, one or both, which a comparison may precede."""
         if self.token.text not in ("in", "with") or self.on_new_line(self.position):
             return comparison
         first = self.token
@@ -500,8 +504,7 @@ class _Parser(Uses):
         self.unexpected(f"{wanted} after `{last.text[:40]}`")
 
     def semicolon(self, value: Expression, *, may_open: bool = False) -> None:
-        """Read the end of an entry. A missing semicolon at a line's end is noted and forgiven. may_open: whether it may
-        be a block's head without its `{` if it ends in a name"""
+        """Read an entry's `;`; one missing at a line's end is noted. may_open: it may be a block's head without `{`."""
         token = self.token
         if token.text == ";":
             self.advance()

@@ -24,6 +24,7 @@ MOST_FACTORS = 32
 
 class Quantities(EditionDifferences):
     def number(self) -> Expression:
+        """Read a number, and the unit that may follow it. Raises Unreadable."""
         token = self.advance()
         value = self.number_value(token)
         unit = self.unit()
@@ -34,6 +35,8 @@ class Quantities(EditionDifferences):
         return Number(value, unit, span(token, last), token.text)
 
     def number_value(self, token: Token) -> float:
+        """The value of a number's token. Raises Unreadable (D027) for one that is too long, too large or too small, or
+        hexadecimal."""
         text = token.text
         if len(text) > LONGEST_NUMBER:
             self.fail("D027", f"a number has at most {LONGEST_NUMBER} characters", token)
@@ -49,6 +52,8 @@ class Quantities(EditionDifferences):
         return value
 
     def not_a_second_number(self, first: Token) -> None:
+        """Refuse two numbers without anything between them, `1.2.3`. first: the first one's token. Raises
+        Unreadable."""
         token = self.token
         if token.kind not in NUMBERS or self.on_new_line(self.position) or (self.open and self.open[-1].text != "{"):
             return
@@ -145,6 +150,12 @@ class Quantities(EditionDifferences):
     def unit_factor(
         self, position: int, sign: int, depth: int, *, first: bool = False
     ) -> tuple[list[tuple[Word, int]], int] | None:
+        """The factor of a unit at token `position`: its units with their powers, and the position of the token behind
+        it; None where there is no unit.
+
+        sign   1, or -1 behind a `/`;  depth: of brackets around it
+        first  whether it is the first unit behind its number, where a deck's own units count too
+        """
         token = self.tokens[position]
         if token.text == "(" and depth < _UNIT_DEPTH:
             inner = self.unit_product(position + 1, sign, depth + 1)
@@ -168,6 +179,8 @@ class Quantities(EditionDifferences):
         return factors, position
 
     def exponent(self, position: int) -> tuple[int, int] | None:
+        """The whole exponent of one digit, with or without sign and brackets, at token `position`, and the position
+        behind it; None where there is none."""
         bracketed = self.tokens[position].text == "("
         position += bracketed
         sign = -1 if self.tokens[position].text == "-" else 1
@@ -178,6 +191,8 @@ class Quantities(EditionDifferences):
         return sign * int(digit.text), position + 1 + bracketed
 
     def not_a_second_unit(self, start: int) -> None:
+        """Refuse a name behind a number with its unit that was meant as another unit, as in `2 N m` or `3 rad/sec`
+        (D028, D030). start: position of the number's token. Raises Unreadable."""
         token = self.token
         if token.kind == NAME and token.text in units.ALL_UNITS and not self.on_new_line(self.position):
             written = "".join(t.text for t in self.tokens[start : self.position])

@@ -74,6 +74,7 @@ def _body(entries: tuple[Entry, ...]) -> str:
 
 
 def _entry(entry: Entry) -> str:
+    """An entry as the text of a deck."""
     if isinstance(entry, Setting):
         name = ".".join(word.text for word in entry.path)
         return " ".join([*(word.text for word in entry.words), name, entry.operator, f"{spell(entry.value)};"])

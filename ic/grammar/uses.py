@@ -146,6 +146,7 @@ class Uses(EditionEntries):
         return False
 
     def use(self) -> None:
+        """Read an entry `use FILE as NAME;`, and append it to `uses`. Raises Unreadable where it is none (D395)."""
         word = self.advance()
         if self.depth or self.open:
             self.fail("D395", "a deck is used outside of blocks and loops", word, help="move this entry out")
@@ -251,6 +252,7 @@ def _changed(entry: Entry, name: Callable[[Name], Name], path: Callable[[tuple[W
     """The entry with its names and the paths that it sets changed."""
 
     def value(expression: Expression) -> Expression:
+        """An expression with its names put under the roof, the name by which another deck uses this one."""
         match expression:
             case Name():
                 return name(expression)

@@ -228,6 +228,7 @@ RATE = Parameter(
 
 
 def _as_of_a_link(entry: Entry) -> Entry:
+    """The entry of a payload that is like this one of a link."""
     return Entry(
         name=entry.name,
         written=entry.written,
@@ -240,6 +241,7 @@ def _as_of_a_link(entry: Entry) -> Entry:
 
 
 def _of_flight(wanted: Parameter, doc: str, default: str, written: str) -> Entry:
+    """An entry of a payload for its motion before it is grappled."""
     return Entry(
         name=wanted.name,
         written=written,

@@ -48,6 +48,7 @@ def _names_of_models(models: Iterable[Model]) -> str:
 
 
 def _rate(name: str, doc: str, default: str) -> Entry:
+    """The entry of a rate in a run's block `rates`."""
     return Entry(
         name=name,
         written=f"{name} = 500 Hz;",

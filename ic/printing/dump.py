@@ -131,6 +131,7 @@ def plan(request: DumpRequest) -> Iterator[str]:
 
 
 def _entry(entry: Entry, indent: str) -> Iterator[str]:
+    """The lines that `met dump syntax` prints of an entry and of all that it contains."""
     from ic.grammar import syntax as tree
     from ic.grammar.spell import spell
 
@@ -176,6 +177,7 @@ def _value(value: Any, named_apart: bool = False) -> tuple[str, Sequence[Entry]]
 
 
 def _block(block: MergedBlock, indent: str) -> Iterator[str]:
+    """The lines that `met dump model` prints of a merged block."""
     from ic.grammar.spell import spell
 
     for item in block.items.values():
@@ -187,6 +189,7 @@ def _block(block: MergedBlock, indent: str) -> Iterator[str]:
 
 
 def _item(item: Item, indent: str) -> Iterator[str]:
+    """The lines that `met dump model` prints of a merged entry, with what it overrides."""
     words = " ".join([*([item.kind] if item.kind else []), item.name, *(word.text for word in item.detail)])
     value = "" if item.value is None else f" = {_value(item.value, item.body is not None)[0]}"
     more = "".join(f" += {_value(addition)[0]}" for addition in item.appended)

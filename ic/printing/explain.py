@@ -156,6 +156,7 @@ def _is_run(path: str, also: Mapping[str, Sequence[str]]) -> bool:
 
 
 def _three_nearest(path: str, known: Iterable[str]) -> list[str]:
+    """The three known paths that are most like this one."""
     near: list[str] = []
     while len(near) < 3 and (near_path := nearest(path, [name for name in known if name not in near])) is not None:
         near.append(near_path)
@@ -218,6 +219,7 @@ def explain_json(
 
 
 def _in_short(experiment: Experiment, name: str) -> tuple[str, ...]:
+    """A parameter in a row: name, value, origin and place."""
     parameter = experiment.parameters[name]
     place = parameter.origin.place
     remark = _note(parameter.origin) or ORIGIN_WORDS[parameter.origin.kind].removesuffix(" here").rstrip(",")
@@ -301,6 +303,8 @@ def _with_source(place: Place, remark: str, also: tuple[Label, ...], sources: Ma
 
 
 def _value_words(experiment: Experiment, parameter: Quantity) -> str:
+    """A parameter's value in words with its unit; of a table its range, and of one that varies its range over the
+    cases."""
     computed = parameter.origin.kind == "derived"  # nobody writes it
     match parameter.value:
         case str():
@@ -367,6 +371,8 @@ def _declaration(experiment: Experiment, name: str) -> tuple[Parameter | None, s
 
 
 def _place_json(place: Place | None) -> dict[str, Any] | None:
+    """A place for JSON, with the macro expansions and the turns of loops that it came through; None where there is
+    none."""
     if place is None:
         return None
     steps = [{"macro": step.macro, "use": _place_json(step.use)} for step in place.macros]

@@ -69,6 +69,8 @@ def explained_json(sources: Sources, path: str) -> list[dict[str, Any]]:
 
 
 def _explained(sources: Sources, path: str) -> list[ExplainedExperiment]:
+    """The experiments that have the path, of the first source that has it at all. sources: the run or sweep that is
+    asked for first, then others of the deck. Raises the Problem of the first where none has it."""
     problem: Problem | None = None
     for n, source in enumerate(sources):
         try:

@@ -152,6 +152,7 @@ def in_terminal(page: Page, width: int | None) -> Iterator[str]:
 
 
 def _part_in_terminal(part: str | Table, width: int | None) -> list[str]:
+    """The lines of a page's text or table."""
     if isinstance(part, str):
         return part.splitlines()
     rows = [part.head, *part.rows] if part.headed else part.rows

@@ -113,6 +113,8 @@ def _table(title: str, rows: Sequence[Sequence[str]]) -> list[str]:
 
 
 def _arm(experiment: Experiment) -> Iterator[str]:
+    """The lines of a plan about its arm: a tree of joints, each with its place (m), turn (deg), link, mass (kg) and
+    servo."""
     whole, structure = experiment.structure, experiment.structure.straight
     values, bends = _Values(experiment), chains(whole.links, whole.joints)
     servos = {use.joint: use for use in structure.servos}
@@ -179,7 +181,8 @@ def _bodies(experiment: Experiment) -> Iterator[str]:
 
 
 def _base(experiment: Experiment, base: Base) -> Iterator[str]:
-    """The motion of the base: its initial state, or the courses of its components."""
+    """The lines of a plan about the motion of the base: its initial state, or what moves each of its components in
+    time."""
     values = _Values(experiment)
     if base.kind == "free":
         yield "Base: moves freely, at the start with"
@@ -207,7 +210,7 @@ def _base(experiment: Experiment, base: Base) -> Iterator[str]:
 
 
 def _payloads(experiment: Experiment) -> list[str]:
-    """The payloads of a run, and when they are grappled and released."""
+    """The lines of a plan about its payloads, and when they are grappled and released."""
     values = _Values(experiment)
     rows = []
     for payload in experiment.structure.payloads:
@@ -240,6 +243,7 @@ def passive(structure: Structure) -> list[str]:
 
 
 def _moves(joint: Joint, values: _Values) -> str:
+    """How a joint moves, in words: revolute or prismatic, its axis, and the pivot if it has one."""
     if joint.kind == "fixed":
         return "fixed"
     axis = values.vector(f"{joint.name}.axis")
@@ -254,6 +258,8 @@ def _moves(joint: Joint, values: _Values) -> str:
 
 
 def _schedule(experiment: Experiment) -> Iterator[str]:
+    """The lines of a plan about its schedule: the rate (Hz) and the ticks of each servo, guide and sensor, of the
+    dynamics and of the record."""
     structure = experiment.structure
     schedule = structure.schedule
     base = schedule.base_hz
@@ -286,7 +292,8 @@ def _schedule(experiment: Experiment) -> Iterator[str]:
 
 
 def _substitutions(experiment: Experiment) -> list[str]:
-    """Motors on beds, with the chosen values of each bed and law: those that are neither defaults nor the servo's."""
+    """The lines of a plan about motors on beds, with the chosen values of each bed and law: those that are neither
+    defaults nor the servo's."""
     values, parameters = _Values(experiment), experiment.parameters
     joints = ", ".join(use.joint for use in experiment.structure.substitutions)
     motors = "motor" if len(experiment.structure.substitutions) == 1 else "motors"
@@ -319,7 +326,7 @@ def _substitutions(experiment: Experiment) -> list[str]:
 
 
 def _guides(experiment: Experiment) -> list[str]:
-    """The guides: the joints that follow each, its parameters, those of its joints and of its path's components."""
+    """The lines of a plan about its guides: the joints that they command, and all parameters."""
     rows: list[tuple[str, ...]] = []
     for use in experiment.structure.guides:
         guide, head = models.find("guide", use.model, use.place), f"guides.{use.name}"
@@ -345,6 +352,7 @@ def _sensors(experiment: Experiment) -> list[str]:
 
 
 def _environment(experiment: Experiment) -> Iterator[str]:
+    """The lines of a plan about the models of its environment."""
     structure = experiment.structure
     products = "with" if structure.velocity_products else "without"
     yield f"Environment: {products} velocity products (Coriolis, centrifugal, gyroscopic)" + (
@@ -361,7 +369,7 @@ def _environment(experiment: Experiment) -> Iterator[str]:
 
 
 def _keys(experiment: Experiment) -> list[str]:
-    """The listed keys of a run that are not at their defaults."""
+    """The lines of a plan about keys of the run that are not at their defaults."""
     rows = []
     for key, value in kept_keys(experiment):
         if key.listed and value != key.parameter.default:
@@ -371,6 +379,7 @@ def _keys(experiment: Experiment) -> list[str]:
 
 
 def _channels(structure: Structure) -> Iterator[str]:
+    """The lines of a plan about what is recorded: channels, rows, and the size of a case's history."""
     width = sum(len(recorded.channels) for recorded in structure.record)
     if not width:
         yield "Recorded: nothing"
@@ -388,6 +397,7 @@ def _channels(structure: Structure) -> Iterator[str]:
 
 
 def _linear(experiment: Experiment) -> list[str]:
+    """The lines of a plan about its linear answers."""
     rows = []
     for use in experiment.linear:
         parts = [("of", use.inputs), ("to", use.outputs), ("open at", use.opened)]
@@ -397,6 +407,7 @@ def _linear(experiment: Experiment) -> list[str]:
 
 
 def _metrics(experiment: Experiment) -> list[str]:
+    """The lines of a plan about its metrics, each with its requirements."""
     rows = []
     for use in experiment.metrics:
         required = [requirement.text for requirement in experiment.requirements if requirement.metric == use.name]
@@ -411,6 +422,8 @@ def _tolerances(experiment: Experiment) -> list[str]:
 
 
 def _cases(experiment: Experiment) -> Iterator[str]:
+    """The lines of a plan about its cases: how many, how large their histories, and the values of each varied
+    parameter; of a search those of `search_lines`."""
     cases = experiment.cases
     if experiment.search is not None and not experiment.search.complete:
         yield from search_lines(experiment, experiment.search)

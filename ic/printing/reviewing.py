@@ -26,6 +26,7 @@ def print_assumptions(compiled: Compiled) -> list[str]:
 
 
 def _row(assumption: Assumption) -> tuple[str, ...]:
+    """The row of an assumption: what it is about, what is assumed, its size, and what that means."""
     size = ""
     if assumption.size is not None:
         where = f" at `{assumption.at}`" if assumption.at not in assumption.subject else ""

@@ -151,6 +151,7 @@ MORE_WORDS = {
 
 
 def channels_page() -> Page:
+    """The page of `met doc channels`, one row for each channel: path, unit, components, meaning."""
     records = channels()
     rows = [
         (
@@ -177,6 +178,7 @@ def channels_page() -> Page:
 
 
 def dh_page() -> Page:
+    """The page of `met doc dh`: how a joint's frame is written by Denavit-Hartenberg numbers."""
     return Page(
         subject="dh",
         title="Denavit-Hartenberg numbers",
@@ -198,6 +200,7 @@ def dh_page() -> Page:
 
 
 def shapes_page() -> Page:
+    """The page of `met doc shapes`: the solids that give a link its inertia."""
     return Page(
         subject="shapes",
         title="Shapes of links",
@@ -253,6 +256,7 @@ def linear_page() -> Page:
 
 
 def units_page() -> Page:
+    """The page of `met doc units`: each unit with its size in SI."""
     records = unit_table()
     rows = [(record["name"], record["word"], in_si(record)) for record in records]
     return Page(

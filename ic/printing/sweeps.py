@@ -63,6 +63,7 @@ OF_DISTRIBUTIONS: Mapping[str, str] = MappingProxyType({
 
 
 def functions_page() -> Page:
+    """The page of `met doc functions`: functions and constants in values."""
     calls = [(name, f"{name}({', '.join(USAGE[name])})", OF_FUNCTIONS[name]) for name in FUNCTIONS]
     table = (
         CSV,
@@ -80,6 +81,7 @@ def functions_page() -> Page:
 
 
 def designs_page() -> Page:
+    """The page of `met doc designs`: ways to choose the points of a sample."""
     early = ("random", f"random({UNTIL_SHOWN}, {AT_MOST} = n)", OF_UNTIL_SHOWN)
     return _words_page(
         "designs",
@@ -92,6 +94,7 @@ def designs_page() -> Page:
 
 
 def distributions_page() -> Page:
+    """The page of `met doc distributions`: distributions of a sampled parameter."""
     return _words_page(
         "distributions",
         title="Distributions",

@@ -50,6 +50,7 @@ def arm_name(body: ArmEntries) -> str:
 
 
 def _about(body: ArmEntries) -> Iterator[str]:
+    """The comments at the head of a deck from a robot's file: its base, and what is left out."""
     weighs = body.base is not None and body.base.weighs
     weight = " Its mass counts in a run with `base = free;`." if weighs else ""
     if not weighs and body.robot.root.inertial is not None:
@@ -124,6 +125,7 @@ def _rows(settings: list[tuple[str, str]]) -> list[list[tuple[str, str]]]:
 
 
 def _link_notes(part: RobotEntry, changed: Mapping[tuple[str, str], str]) -> list[str]:
+    """Remarks on a link for a deck that is made from a robot's file."""
     notes = _called(part, "link", changed)
     inertial = getattr(part.source, "inertial", None)
     if isinstance(inertial, Inertial) and inertial.rpy is not None and inertial.is_turned:
@@ -132,6 +134,7 @@ def _link_notes(part: RobotEntry, changed: Mapping[tuple[str, str], str]) -> lis
 
 
 def _joint_notes(part: RobotEntry, changed: Mapping[tuple[str, str], str]) -> list[str]:
+    """Remarks on a joint for a deck that is made from a robot's file: its name there, and what a deck has elsewhere."""
     notes = _called(part, "joint", changed)
     joint = part.source
     assert isinstance(joint, Joint)

@@ -94,6 +94,7 @@ class ArmEntries:
 
 
 def arm_entries(robot: Robot) -> ArmEntries:
+    """The entries of a deck's arm that a robot's file gives: links, joints and base, with notes on their origin."""
     names = deck_names(robot)
     links = tuple(RobotEntry(link, _link(link, names.links[link.name.text])) for link in robot.carried)
     kinds = {joint.name.text: _kind(joint) for joint in robot.joints}
@@ -104,6 +105,7 @@ def arm_entries(robot: Robot) -> ArmEntries:
 
 
 def _notes(robot: Robot) -> Iterator[tuple[Place, str]]:
+    """Where an arm's entries do not come from the robot's file as they stand: places, each with the reason."""
     for link in robot.links:
         inertial = link.inertial
         if inertial is None:
@@ -120,6 +122,7 @@ def _notes(robot: Robot) -> Iterator[tuple[Place, str]]:
 
 
 def _link(link: Link, name: str) -> Group:
+    """The entry of a link of a robot's file: mass (kg), centre of mass (m), inertia (kg m^2)."""
     inertial = link.inertial
     if inertial is None:
         settings = [_setting("mass", _number(0.0, "kg", link.name.place), link.name.place)]
@@ -153,7 +156,7 @@ def _mesh(visual: Visual) -> Expression:
 
 
 def moments(inertial: Inertial) -> Numbers:
-    """xx, yy, zz in the link's axes, and xy, xz, yz where one of them is not zero."""
+    """The moments of inertia xx, yy, zz in the link's axes, kg m^2, and xy, xz, yz where one of them is not zero."""
     numbers = inertial.moments
     if inertial.rpy is not None and inertial.is_turned:
         numbers = Numbers(_turned(numbers.values, inertial.rpy.values), numbers.place)  # each of them made of all
@@ -172,6 +175,7 @@ def _turned(values: tuple[float, ...], rpy: tuple[float, ...]) -> tuple[float, .
 
 
 def rotation(roll: float, pitch: float, yaw: float) -> tuple[tuple[float, float, float], ...]:
+    """The rotation matrix Rz(yaw) Ry(pitch) Rx(roll), rad."""
     (cr, sr), (cp, sp), (cy, sy) = (_turn(angle) for angle in (roll, pitch, yaw))
     return (
         (cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr),
@@ -248,6 +252,7 @@ def _end(key: str, link: Written, names: DeckNames) -> Setting:
 
 
 def _axis(axis: Numbers) -> Expression:
+    """A joint's axis as a deck writes it: `z`, `-x`, or three numbers."""
     x, y, z = axis.values
     if (x, y, z) in AXES:
         return _name(AXES[x, y, z], axis.place)
@@ -269,6 +274,7 @@ def _setting(key: str, value: Expression, place: Place) -> Setting:
 
 
 def _vector(key: str, numbers: Numbers, unit: str) -> Setting:
+    """The entry of three numbers with a unit, each with its place in the file."""
     place = numbers.place
     places = numbers.places or (place,) * len(numbers.values)
     items = tuple(_bare(value, spot) for value, spot in zip(numbers.values, places, strict=True))

@@ -62,7 +62,7 @@ def load(name: str, text: str) -> ArmEntries:
 
 
 def _file_named(made_from: Call) -> String:
-    """Raise Problem D214 for anything but `urdf("FILE")`."""
+    """The file of `urdf("FILE")`, from which an arm is made. Raises Problem D214 for anything else."""
     name = made_from.name.text
     if name not in MODELS:
         raise Problem(

@@ -47,6 +47,7 @@ class DeckNames:
 
 
 def deck_names(robot: Robot) -> DeckNames:
+    """The names of a robot's links and joints in a deck, and those that had to be changed."""
     links = {robot.root.name.text: "base"}
     links |= _named([link.name for link in robot.carried], "link", {"base"})
     joints = _named([joint.name for joint in robot.joints], "joint", set(links.values()))
@@ -63,7 +64,8 @@ def word(text: str, kind: str) -> str:
 
 
 def _named(written: Sequence[Written], kind: str, taken: set[str]) -> dict[str, str]:
-    """taken: names of other kinds."""
+    """A name that decks allow for each element of a robot's file, by its name there; those that are allowed already
+    stay. taken: names of other kinds."""
     names: dict[str, str] = {}
     others, taken = taken, set(taken)
     for element in sorted(written, key=lambda name: word(name.text, kind) != name.text):  # unchanged ones first

@@ -84,6 +84,7 @@ def read(name: str, text: str) -> Robot:
 
 
 def _within(root: Element) -> Iterator[Element]:
+    """An element and all elements in it, in the order of the file."""
     stack = [root]
     while stack:
         element = stack.pop()
@@ -97,6 +98,7 @@ def _link(element: Found) -> Link:
 
 
 def _inertial(element: Found) -> Inertial:
+    """The inertia of a link: mass (kg), moments (kg m^2, 0 where left out), and the frame that they are in."""
     inertia = element.inside["inertia"]
     moments = [inertia.numbers.get(name) for name in MOMENTS]
     values = tuple(0.0 if moment is None else moment.values[0] for moment in moments)
@@ -107,7 +109,7 @@ def _inertial(element: Found) -> Inertial:
 
 
 def _origin(element: Found) -> tuple[Numbers | None, Numbers | None]:
-    """xyz and rpy of the `<origin>` inside."""
+    """Place and rpy of the element `<origin>` inside, m and rad."""
     origin = element.inside.get("origin")
     return (None, None) if origin is None else (origin.numbers.get("xyz"), origin.numbers.get("rpy"))
 
@@ -134,6 +136,7 @@ def _joint(element: Found) -> Joint:
 
 
 def _mimic(element: Found | None) -> Mimic | None:
+    """The law by which a joint follows another, multiplier and offset; None where it follows none."""
     if element is None:
         return None
     law = {name: numbers.values[0] for name, numbers in element.numbers.items()}
@@ -141,6 +144,7 @@ def _mimic(element: Found | None) -> Mimic | None:
 
 
 def _check_names(named: Sequence[Link] | Sequence[Joint], kind: str, complaints: Complaints) -> None:
+    """Report links, or joints, of one name (D204)."""
     first: dict[str, Place] = {}
     for element in named:
         if element.name.text in first:

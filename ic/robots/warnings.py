@@ -56,6 +56,7 @@ def warnings_of(body: ArmEntries, named: Place) -> Iterator[Diagnostic]:
 
 
 def _left_out(body: ArmEntries) -> Iterator[Label]:
+    """Labels about parts of a robot's file that a deck's arm does not take over, one for each kind."""
     robot = body.robot
     rubbing = [joint for joint in robot.joints if joint.friction_at is not None and joint.type.text in MOVING]
     if rubbing and rubbing[0].friction_at is not None:

@@ -72,6 +72,7 @@ class Element:
         return self._source.place(*self._written(attribute).span(1))
 
     def _written(self, attribute: str) -> re.Match[bytes]:
+        """The match of an attribute in the file's bytes, for its place."""
         offset = self._offset + 1 + len(self.tag.encode())
         while (match := _ATTRIBUTE.search(self._source.data, offset)) is not None:
             if match[1] == attribute.encode():
@@ -95,6 +96,8 @@ def parse(name: str, text: str) -> Element:
         return source.place(parser.CurrentByteIndex, parser.CurrentByteIndex + length)
 
     def start(tag: str, attributes: dict[str, str]) -> None:
+        """Expat's handler of an opening tag: hang its element into the tree. Raises Problem D202 beyond the limits of
+        number and depth."""
         nonlocal count
         count += 1
         if count > MOST_ELEMENTS:
@@ -118,6 +121,7 @@ def parse(name: str, text: str) -> Element:
         open_.pop()
 
     def document_type(*_: object) -> None:
+        """Expat's handler of a document type: raise Problem D201."""
         begin = b"<!DOCTYPE"
         offset = max(0, source.data.rfind(begin, 0, parser.CurrentByteIndex + len(begin)))
         raise Problem(

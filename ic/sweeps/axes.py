@@ -311,6 +311,7 @@ class _SweepReader:
         self.axes.append(SweepAxis(tuple(columns), sample.note, sample.design, sample.until_shown))
 
     def repeats(self, statement: Statement) -> None:
+        """Read the number of repeats of each case. Raises Problem D040 for a second one."""
         if self.repeated is not None:
             raise Problem(
                 error(
@@ -327,6 +328,7 @@ class _SweepReader:
     # One column
 
     def note(self, path: str, place: Place) -> None:
+        """Note a path as varied by the sweep. Raises Problem D040 where it is already."""
         if path in self.written:
             raise Problem(
                 error(
@@ -340,7 +342,8 @@ class _SweepReader:
         self.written[path] = place
 
     def column(self, entry: Setting, detail: Sequence[Word] = ()) -> Column:
-        """detail: `macro` where it is written."""
+        """The column of an entry `PATH = VALUES` of a sweep: what it varies, and the values. detail: `macro` where it
+        is written. Raises Problem."""
         path = ".".join(word.text for word in entry.path)
         place = path_place(entry)
         if detail:

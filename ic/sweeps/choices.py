@@ -228,6 +228,7 @@ def _option(item: Expression, names: Names, unit: Unit | None) -> Option:
 
 
 def _number(value: Value, unit: Unit | None) -> Option:
+    """The option of a choice that is a number. Raises Problem D121 where it depends on what the sweep varies."""
     if isinstance(value.number, Scalar):
         raise Problem(
             error(
@@ -319,6 +320,8 @@ def _group(key: str, body: tuple[Entry, ...], place: Place) -> Group:
 
 
 def _place(tree: dict[str, Any], keys: Sequence[str], column: ChoiceColumn, option: Option) -> None:
+    """Put a choice into a tree of entries by the words of its path. Raises Problem D123 where another one sets the
+    same."""
     branch = tree
     for key in keys[:-1]:
         branch = branch.setdefault(key, {})
@@ -331,6 +334,7 @@ def _place(tree: dict[str, Any], keys: Sequence[str], column: ChoiceColumn, opti
 
 
 def _both(earlier: ChoiceColumn, later: ChoiceColumn) -> Problem:
+    """The error for two varied paths that set the same (D123)."""
     return Problem(
         error(
             "D123",
@@ -343,6 +347,7 @@ def _both(earlier: ChoiceColumn, later: ChoiceColumn) -> Problem:
 
 
 def _entries(tree: dict[str, Any]) -> Iterator[Entry]:
+    """The entries of a deck that a tree of choices stands for."""
     for key, inner in tree.items():
         if isinstance(inner, dict):
             entries = tuple(_entries(inner))

@@ -123,6 +123,8 @@ def _fewest_of_a_choice(chosen: Sequence[AxisColumn]) -> int:
 
 
 def _note(complaints: Complaints, requirement: Requirement, fewest: int) -> str:
+    """A line on the number of cases that a requirement with a confidence needs; warns where there are too few to show
+    it (D352). fewest: cases of a design point."""
     assert requirement.share is not None and requirement.confidence is not None
     needed, more = (confidence.cases_needed(requirement.share, requirement.confidence, missed) for missed in (0, 1))
     if fewest < needed:

@@ -89,6 +89,7 @@ class SampleDesign:
 
     @property
     def note(self) -> str:
+        """The sample in words, with its seed, for the plan."""
         about = ": another count would draw other values" if self.design == "lhs" else ""
         if self.design == "saltelli":
             about = f": {self.count} times {len(self.parts) + 2} cases"
@@ -153,7 +154,8 @@ def _points(design: str, count: int, parts: int, seed: int, number: int) -> np.n
 def read_sample(
     definitions: Definitions, complaints: Complaints, statement: Statement, paths: Mapping[str, Place], seed: int
 ) -> SampleDesign:
-    """`sample lhs(200) { PATH = uniform(a, b) UNIT; ... }`. paths: what the sweep varies, and where.
+    """Read the entry `sample lhs(200) { PATH = uniform(a, b) UNIT; ... }` of a sweep. paths: what the sweep varies, and
+    where.
 
     Raises Problem, placed.
     """
@@ -261,6 +263,7 @@ def _until_shown(call: Call, definitions: Definitions) -> Place | None:
 
 
 def _count(value: Value, most: int) -> int:
+    """The number of samples of a design. Raises Problem D113 unless it is whole, from 1 to `most`."""
     number = value.number
     if (
         isinstance(number, Scalar)

@@ -115,6 +115,7 @@ class Effects:
             self._report_unknown(complaints, scope, path, entry, where)
 
     def _report_idle(self, complaints: Complaints, scope: Scope, path: str, entry: Setting, where: str) -> None:
+        """Report a setting that changes nothing in a run or sweep (D236). where: in words."""
         if complaints.errors:  # any of which may be the cause
             return
         first = entry.path[0].text
@@ -274,6 +275,7 @@ def _named(definitions: Definitions, entries: Sequence[Entry]) -> set[str]:
 
 
 def _expressions(entries: Sequence[Entry]) -> Iterable[Expression]:
+    """The values of these entries, and of those in their blocks."""
     for entry in entries:
         if isinstance(entry, Group):
             yield from _expressions(entry.body)

@@ -186,6 +186,8 @@ class _Sweep:
             kept_rows(scope, replace(sweep, excludes=tuple(excludes)), first, (), resolved.structure)
 
     def _read(self, definitions: Definitions, definition: Definition) -> _Read:
+        """Read the block of a sweep, search or tuning with the settings from outside, and with the run that it is
+        of."""
         settings = self.source.settings
         definitions, base = settings.in_run(definitions, _base(definitions, definition, self.complaints))
         graph = Graph()
@@ -276,7 +278,8 @@ class _Sweep:
         return ((built, scope), rows), dropped
 
     def _with_macros(self, sweep: Sweep, choices: Choices) -> _Read:
-        """The deck read with the chosen macros."""
+        """What the sweep reads as where these choices set macros of the deck; read once for each set. Raises Problem
+        D226 where it varies something else then."""
         macros = tuple(f"{column.macro}={option.text}" for column, option in choices if column.macro)
         if macros not in self.read_so_far:
             definitions = self.source.definitions_with(macros)
@@ -304,6 +307,8 @@ class _Sweep:
         return self.read_so_far[macros]
 
     def _report_exclusions(self, dropped: Mapping[Place, int], some: bool) -> None:
+        """Report conditions that exclude all cases (D139), or warn of those that exclude none (D138). dropped: excluded
+        cases by condition."""
         if not some and dropped:
             *others, last = dropped
             self.complaints.error(
@@ -346,6 +351,7 @@ def _what_varies(sweep: Sweep) -> list[list[list[str]]]:
 
 
 def _base(definitions: Definitions, definition: Definition, complaints: Complaints) -> Definition:
+    """The run that a sweep is of. Raises Problem D059 for a path."""
     base = definition.group.of
     assert base is not None  # a sweep without one is not a definition
     if len(base.path) > 1:

@@ -95,7 +95,7 @@ def _overridden(scope: Scope, first: str, rest: str) -> list[Label] | None:
 
 
 def no_scale(path: str) -> list[str]:
-    """The remedy for a missing scale of a bed."""
+    """The remedy for a path into a motor bed's `scale` where the bed has none."""
     joint, separator, _ = path.partition(".bed.scale.")
     return [f"its bed has no scale: `scale {{ }}` in `substitute {joint}` gives it one"] if separator else []
 

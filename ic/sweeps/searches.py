@@ -170,7 +170,8 @@ class _SearchReader:
         return f"{f'{CHOOSE} ' * self.tunes}PATH = between(LOW, HIGH) UNIT;"
 
     def enter(self, entry: object) -> None:
-        """Read one entry. Raises Problem."""
+        """Read one entry of the block of a search or tuning. Raises Problem for one that it does not have, or a wrong
+        value."""
         words = [word.text for word in getattr(entry, "words", ())]
         match entry:
             case Setting() if not words and _path(entry) in ("at_most", "seed", *(MARGINS * self.tunes)):
@@ -220,6 +221,7 @@ class _SearchReader:
             )  # fmt: skip
 
     def _once(self, key: str, place: Place) -> None:
+        """Note an entry as written. Raises Problem D040 where it is there twice."""
         if key in self.written:
             raise Problem(
                 error("D040", f"`{key}` is written twice", place, also=[Label(self.written[key], "first")],
@@ -228,6 +230,8 @@ class _SearchReader:
         self.written[key] = place
 
     def _number(self, entry: Setting, key: str) -> None:
+        """Read an entry of one number: `seed`, `margin`, `least_margin` or `at_most`. Raises Problem D363 for a number
+        out of its range."""
         self._once(key, path_place(entry))
         if key == "seed":
             self.seed = whole_number(self.definitions, entry.value, "a seed", least=0)
@@ -254,6 +258,7 @@ class _SearchReader:
         self.at_most, self.at_most_place = int(number), value.place
 
     def _goal(self, entry: Statement, word: str) -> None:
+        """Read the goal of a search or tuning, the metric that is to be smallest or largest. Raises Problem D362."""
         other = next((goal for goal in GOALS if goal in self.written), None)
         if other is not None:
             helps = ["leave one out", "what else matters is required in the run: `require METRIC < LIMIT;`"]
@@ -282,6 +287,8 @@ class _SearchReader:
         self.chosen.append(self._ends(path, entry))
 
     def _ends(self, path: str, entry: Setting) -> _Chosen:
+        """The chosen parameter of an entry `PATH = between(LOW, HIGH) UNIT;`, its ends in SI. Raises Problem D361 for
+        what is no such range, D063 for ends of two dimensions."""
         names = Names(self.definitions, {}, watched=set(self._paths))
         unit, call = (entry.value.unit, entry.value.inner) if isinstance(entry.value, WithUnit) else (None, entry.value)
         ranges = known_words("ranges", RANGES)
@@ -319,6 +326,8 @@ class _SearchReader:
         return _Chosen(parameter, path_place(entry), low, entry.value if isinstance(entry.value, WithUnit) else None)
 
     def _refuse(self, entry: object, words: list[str]) -> None:
+        """Raise Problem D360 for an entry that a search or tuning does not have, with what may have been meant. words:
+        before its path."""
         place: Place = entry.place  # type: ignore[attr-defined]  # every entry has one
         kind, base = self.definition.kind, self.definition.group.of
         block = BLOCKS[kind]
@@ -364,7 +373,7 @@ def _against(
     seed: int,
     fixed: Collection[str],
 ) -> Sweep | None:
-    """The sweep against which a tuning is judged, or by which it is confirmed; None where it has mistakes, which are
+    """The sweep whose cases a tuning is judged on, or by which it is confirmed; None where it has mistakes, which are
     reported. Raises Problem D364 where it is unsuitable."""
     known, place = definitions.of_kind("sweep"), name.place
     if name.text not in known:
@@ -415,8 +424,8 @@ def _against(
 
 
 def _fresh(against: Sweep | None, drawn: Sweep | None, name: Name) -> tuple[tuple[float, ...], ...]:
-    """The cases of a sweep by which a tuning is confirmed, as those of `_plants` of the one that it is against. Raises
-    Problem D364 where they are no others."""
+    """The cases of the sweep by which a tuning is confirmed, coordinates as `_plants` has them of the sweep that it is
+    judged on. Raises Problem D364 where they are the same cases."""
     if drawn is None:
         return ()
     first, paths = _plants(against), [column.path for column in drawn.varied]
@@ -442,7 +451,8 @@ def _draws(sweep: Sweep) -> bool:
 
 
 def _plants(sweep: Sweep | None) -> tuple[tuple[float, ...], ...]:
-    """The values of a sweep's coordinates in each of its cases."""
+    """The values of a sweep's coordinates in each of its cases (the plants of a tuning, on which it judges its
+    candidates)."""
     if sweep is None:
         return ()
     rows = SweptRows(sweep.sizes, (None,) * len(sweep.sizes))
@@ -459,8 +469,9 @@ def _plants(sweep: Sweep | None) -> tuple[tuple[float, ...], ...]:
 
 
 def with_corners(search: Search, columns: Mapping[str, CaseValues]) -> tuple[dict[str, np.ndarray], int]:
-    """The cases of the first generation, then others that may occur: at the bounds of the chosen parameters, and with
-    each plant; and their total number. Results for these are assumed to hold in between."""
+    """The cases of a search's first generation, then others that may occur: at the bounds of the chosen parameters, and
+    with each plant (a case of the sweep that a tuning judges candidates on); and their total number. The results of
+    checks for these are assumed to hold in between."""
     ends = [(parameter.low, parameter.high) for parameter in search.parameters]
     if len(ends) <= MOST_CORNERS:
         corners = list(itertools.product(*ends))

@@ -230,6 +230,7 @@ def applies_to(definitions: Definitions, run: Definition, entry: Setting) -> boo
 
 
 def _of_another_dimension(path: str, old: Value, new: Value, defined) -> Problem:  # type: ignore[no-untyped-def]
+    """The error for a setting without a unit (D060), or of another dimension than what it sets (D061)."""
     wanted, also = units.text(old.dimension), [Label(defined, "defined here")]
     if new.bare:
         number = "..." if isinstance(new.number, Scalar) else units.ONE.decimal(new.number)
@@ -307,6 +308,7 @@ def _places(entries: Iterable[Entry]) -> Iterator[Place]:
 
 
 def _places_in(expression: Expression) -> Iterator[Place]:
+    """The places of an expression and of all its parts."""
     yield place_of(expression)
     if isinstance(expression, Call):
         yield from (word.place for word, _ in expression.named)

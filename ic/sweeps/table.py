@@ -157,6 +157,8 @@ class _Truths(Truths):
         self.scope.complaints.add(replace(diagnostic, severity="warning"))
 
     def look_at(self, compared: NumberComparison, left: np.ndarray, right: np.ndarray, mask: np.ndarray) -> None:
+        """Count, for a warning, the rows of an exclusion's comparison that are not-a-number, or equal but for
+        rounding."""
         key = self.statement, id(compared.expression)
         seen = self._seen.setdefault(key, _SeenComparison(compared))
         seen.lost += int(np.count_nonzero(mask & (np.isnan(left) | np.isnan(right))))

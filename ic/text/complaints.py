@@ -119,7 +119,8 @@ class Complaints:
         return (bool(self.errors), *sets)
 
     def findings(self) -> DefinitionFindings:
-        """The findings of an `apart` collector."""
+        """What this collector holds of one definition, to be kept and brought into another check. It must be an `apart`
+        collector."""
         return DefinitionFindings(
             tuple(diagnostic for diagnostic in self._diagnostics if diagnostic != _BEFORE),
             tuple(self._remarks),
@@ -189,6 +190,7 @@ class Complaints:
                 self._record(diagnostic)
 
     def _record(self, diagnostic: Diagnostic) -> None:
+        """Add a diagnostic, unless the same mistake is known, or it only follows from an unreadable part."""
         self.error_count += diagnostic.severity == "error"
         if (
             not self.is_of_another_iteration(diagnostic)
@@ -208,6 +210,7 @@ class Complaints:
         return next(iter(known)) != iterations
 
     def _with_iterations(self, diagnostic: Diagnostic) -> Diagnostic:
+        """A diagnostic from inside a loop with a remark on the other iterations that have it too."""
         if not self._iterations or diagnostic.at is None or not diagnostic.at.place.iterations:
             return diagnostic
         others = tuple(self._iterations.get(_mistake(diagnostic), ()))[1:]
@@ -274,6 +277,8 @@ class Complaints:
         also: Iterable[Label] = (),
         help: Iterable[str] | str = (),
     ) -> None:
+        """Add an error. One about the steps of a servo or sensor waits until the whole arm's step has been checked
+        (`settle`)."""
         diagnostic = error(code, message, place, also=also, help=help)
         if code in PROVISIONAL:
             self._provisional.append(diagnostic)
@@ -355,6 +360,7 @@ class Complaints:
         also: Iterable[Label] = (),
         help: Iterable[str] | str = (),
     ) -> None:
+        """Add a warning."""
         self.add(replace(error(code, message, place, also=also, help=help), severity="warning"))
 
     def remark(
@@ -377,6 +383,7 @@ class Complaints:
             self._note_remark(diagnostic)
 
     def _note_remark(self, diagnostic: Diagnostic) -> None:
+        """Add a warning about the deck's meaning, unless the run allows it or it is there already."""
         if self._is_silenced(diagnostic):
             return
         spot = (diagnostic.code, diagnostic.at and diagnostic.at.place)

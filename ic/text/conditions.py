@@ -117,6 +117,7 @@ class _Condition:
         self.depth = 0
 
     def truth(self) -> bool:
+        """True if the whole condition is not 0. Raises Refused."""
         value = self.whole(live=True)
         if self.position < len(self.tokens):
             self.cannot_follow()
@@ -134,6 +135,7 @@ class _Condition:
         self.refuse(f"this condition cannot be understood: {why}", token, words or _USUAL)
 
     def cannot_follow(self) -> NoReturn:
+        """Refuse the token behind a complete condition, with what may have been meant."""
         token, before = self.tokens[self.position], self.tokens[self.position - 1]
         self.no_stray(token)
         if token.text == "=":
@@ -168,6 +170,7 @@ class _Condition:
         return self.tokens[self.position].text if self.position < len(self.tokens) else ""
 
     def take(self, text: str, opening: Token) -> None:
+        """Take the sign that is to be next. opening: the one that it closes. Raises Refused where another is there."""
         if self.text() != text:
             if self.position < len(self.tokens):
                 if self.text() not in (")", ":"):
@@ -190,6 +193,7 @@ class _Condition:
         return value
 
     def choice(self, live: bool) -> _Value:
+        """Read `a ? b : c`, or what binds tighter. live: False where C does not evaluate it."""
         condition = self.binary(1, live)
         if self.text() != "?":
             return condition

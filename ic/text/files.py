@@ -59,6 +59,7 @@ class Directory:
     name: str
 
     def join(self, file: str) -> FoundFile:
+        """The file of a name in this folder; of one in the library, its name is in < >."""
         if self.name.startswith("<"):
             return FoundFile(
                 os.path.join(self.path, file), f"<{posixpath.normpath(posixpath.join(self.name[1:-1], file))}>"
@@ -124,7 +125,7 @@ class Files:
         return next((library_file for d in self.path if os.path.isfile((library_file := d.join(name)).path)), as_named)
 
     def in_memory(self, text: str) -> FoundFile:
-        """The deck given as text: its includes are searched as if it stood in the current folder."""
+        """The deck that is given as text; files that it includes are looked for from the current folder."""
         file = FoundFile(DECK_IN_MEMORY, DECK_IN_MEMORY)
         self._keep(file, text.encode("utf-8", "surrogatepass"), "deck", MOST_BYTES)
         return file
@@ -255,6 +256,7 @@ def _read_bytes(file: FoundFile, kind: str, most: int) -> bytes:
 
 
 def _archive(file: FoundFile, kind: str) -> Diagnostic:
+    """The error for an archive in place of a deck (D002)."""
     helps = [
         f"`met show {file.name}` and `met report {file.name}` show what is in it",
         f"its decks, and the parameters of a case: `batch.open({file.name!r}).met.sources`, `.met.parameters('#0')`",
@@ -303,6 +305,7 @@ def decode(data: bytes, name: str, kind: str) -> tuple[str, Diagnostic | None]:
 
 
 def _xml(text: str, name: str) -> Diagnostic:
+    """The error for an XML file in place of a deck (D002)."""
     before = text[: text.index("<")]
     place = Place(name, before.count("\n") + 1, len(before) - before.rfind("\n"))
     file = posixpath.basename(name)
@@ -318,6 +321,7 @@ def _xml(text: str, name: str) -> Diagnostic:
 
 
 def _place_of_byte(data: bytes, offset: int, name: str) -> Place:
+    """The line and column of a byte of a file."""
     before = data[:offset].replace(b"\r\n", b"\n").replace(b"\r", b"\n")
     start = before.rfind(b"\n") + 1
     column = len(before[start:].decode("utf-8-sig" if start == 0 else "utf-8", errors="replace")) + 1

@@ -57,6 +57,7 @@ class Findings(Complaints):
         self._errors = 0
 
     def add(self, *diagnostics: Diagnostic) -> None:
+        """Add diagnostics, each once. Raises GiveUp after `MOST_ERRORS` errors (D018)."""
         for diagnostic in diagnostics:
             place = diagnostic.at.place if diagnostic.at else None
             key = (diagnostic.code, diagnostic.message, place and (place.file, place.line, place.column))

@@ -88,6 +88,7 @@ class Macros(Pcpp):
             definitions.warn_of_quantity(name, macro.body, self.findings)
 
     def undef(self, tokens: list[Token]) -> None:
+        """Remove the macro of an `#undef`."""
         if tokens[0].kind != NAME:
             self.findings.error("D007", "`#undef` needs a name", tokens[0].place, help="write `#undef NAME`")
             return
@@ -360,6 +361,7 @@ class Macros(Pcpp):
         return self.is_macro(token.text)
 
     def _check_made(self, token: Token, replacement: list[Token]) -> None:
+        """Give up where the tokens that macros make are too many or too long (D013)."""
         self._expanded += len(replacement) + 1
         self._expanded_here += len(replacement) + 1
         if self._expanded_here > MOST_FROM_ONE_USE:
@@ -373,6 +375,7 @@ class Macros(Pcpp):
                 self._endless(token, f"macro `{token.text}` makes a token of {len(piece.text)} characters")
 
     def _endless(self, token: Token, message: str) -> None:
+        """Give up on a macro that expands without end (D013)."""
         macro = self.macros.get(token.text)
         self._give_up(
             "D013",
@@ -383,6 +386,7 @@ class Macros(Pcpp):
         )
 
     def _nothing_after(self, rest: Iterable[Token], what: str) -> None:
+        """Report what stands behind a directive that takes nothing more (D007)."""
         extra = next((token for token in rest if token.kind != SPACE), None)
         if extra is not None:
             self.findings.error(

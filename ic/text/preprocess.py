@@ -180,6 +180,7 @@ class _Preprocessor(Macros):
     # reading
 
     def define_from_command_line(self, defines: Sequence[str]) -> None:
+        """Define the macros of `-D NAME=VALUE`, whose tokens have places on the command line."""
         if not defines:
             return
         written = "".join(
@@ -241,6 +242,8 @@ class _Preprocessor(Macros):
         self.findings.warn("D036", message, place, also=(label,), help=help)
 
     def _read(self, file: FoundFile, source: Text, place: Place) -> None:
+        """Append a file's tokens to `output`, its directives carried out. place: of the `#include`. Stray characters
+        and an `#if` that is not closed are reported (D008)."""
         self._including.append((file, source))
         self._entered.append(place)
         self._ifs.append([])

@@ -61,6 +61,8 @@ class _Along:
     number an instant."""
 
     def __init__(self, experiment: Experiment, case: int) -> None:
+        """Compute the commanded motion of a case's joints at `INSTANTS` instants, and that of the joints that follow
+        them."""
         builder = Builder(System(experiment))
         program = builder.program()
         (values,) = inputs(experiment, np.array([case]))
@@ -141,6 +143,8 @@ class _Along:
                 )
 
     def assumptions(self) -> Iterator[Assumption]:
+        """What the run assumes: gravity, velocity products, a base that is held, joints without drive or limits, and
+        numbers that are 0 because the deck does not say them."""
         structure = self.system.structure
         if self.names and not structure.free:
             yield from self._gravity()
@@ -164,11 +168,13 @@ class _Along:
 
     @cached_property
     def moving(self) -> Solved:
-        """All that the run computes, together."""
+        """Inverse dynamics along the commanded motion with all that the run computes."""
         products = self.system.structure.velocity_products
         return self.solved(gravity=self.gravity, rates=products, accelerations=True)
 
     def _gravity(self) -> Iterator[Assumption]:
+        """The gravity that is assumed, with its largest load on a joint; where there is none, with the load that the
+        Earth's would be."""
         g = self.gravity
         if any(g):
             size = math.hypot(*g)
@@ -187,7 +193,8 @@ class _Along:
         yield from self.largest("velocity products", "computed" if taken else "off", meaning, torques)
 
     def _base(self) -> Iterator[Assumption]:
-        """The largest force and moment that a joint exerts on a base that is held."""
+        """The assumption that the base is held, with the largest force (N) and moment (N m) that a joint exerts on
+        it."""
         wrenches, looped = reactions(self.tree, self.moving), in_loops(self.system.structure.joints)
         for part, unit, meaning in ((1, "N", "the largest force on it"), (0, "N*m", "the largest moment on it")):
             sizes = {
@@ -201,7 +208,8 @@ class _Along:
             yield Assumption("base", "held", sizes[joint], unit, joint, meaning)
 
     def _drive(self, i: int, joint: Joint, actuator: Actuator | None) -> Iterator[Assumption]:
-        """A joint that nothing drives, and one that goes with its command whatever that takes."""
+        """The assumption about a joint that nothing drives, or that goes with its command whatever torque that
+        takes."""
         if actuator is None or actuator.servo.follows:
             size = float(np.max(np.abs(self.moving.tau[i])))
             assumed, meaning = "no motor", "what its command takes, without a limit"
@@ -210,7 +218,8 @@ class _Along:
             yield Assumption(f"joint `{joint.name}`", assumed, size, _unit(joint), joint.name, meaning)
 
     def _zeros(self) -> Iterator[Assumption]:
-        """Numbers of servos that are 0 because the deck does not say, those of like servos together."""
+        """The assumption that numbers of servos are 0 where the deck does not say them, one for servos that are
+        alike."""
         joints: dict[str, list[str]] = {}
         for actuator in self.system.working:
             known = {

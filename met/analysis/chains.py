@@ -50,6 +50,7 @@ def numbered(chain: Experiment) -> tuple[Experiment, Mapping[str, str]]:
     links = {link.name: str(number) for number, link in enumerate(structure.links)} | {BASE: BASE}
 
     def path_of(path: str) -> str:
+        """A parameter's path with the numbered names of its joint or link."""
         head, *rest = path.split(".")
         if head in ("links", "initial"):
             return ".".join([head, (links if head == "links" else joints)[rest[0]], *rest[1:]])
@@ -77,6 +78,8 @@ def numbered(chain: Experiment) -> tuple[Experiment, Mapping[str, str]]:
 
 
 def _are_apart(structure: Structure) -> bool:
+    """True if nothing in the structure acts between joints other than through their own chain, so that its chains can
+    be simulated alone."""
     names = [*(joint.name for joint in structure.joints), *(link.name for link in structure.links)]
     between = (structure.base, structure.payloads, structure.guides, structure.sensors, structure.substitutions)
     return (
@@ -111,6 +114,7 @@ def _reduced(experiment: Experiment, joints: frozenset[str]) -> Experiment:
     links = {joint.child for joint in structure.joints if joint.name in joints} | {BASE}
 
     def is_of_it(path: str) -> bool:
+        """True if a parameter belongs to the chain, or to no joint or link."""
         head, *rest = path.split(".")
         if head in ("links", "initial"):
             return rest[0] in (links if head == "links" else joints)

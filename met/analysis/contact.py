@@ -102,6 +102,7 @@ def _meeting(builder: Builder, tape: PlainTape, name: str, model: Environment, p
         return model.touch(p, ArmWorld(system, tape.read, tree, moving, base, 0.0, 0.0))  # type: ignore[misc]
 
     def approach(push: float) -> float:
+        """The acceleration at which the bodies approach, m/s^2, under a push of this size at the contact, N."""
         touching = touch(y.qd)
         force = touching.forces(p, scale(push, touching.normal))
         vars(system)["environment"] = ((name, replace(model, loads=lambda p, world: Loads(forces=force))),)

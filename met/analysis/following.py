@@ -112,7 +112,8 @@ def unfollowed(
 
 
 def _is_own(experiment: Experiment, command: object) -> bool:
-    """True for a course in time; the setpoint of a steering guide is judged by the guide's own error."""
+    """True for a command that is a function of time. A setpoint that a guide computes as it runs is judged by the
+    guide's own error."""
     guide = getattr(command, "guide", "")
     use = next((use for use in experiment.structure.guides if use.name == guide), None)
     return use is None or models.find("guide", use.model, use.place).course is not None

@@ -111,7 +111,7 @@ def margins(
     span: tuple[float, float] | None = None,
     reach: float = 1.0,
 ) -> tuple[tuple[Margin, ...], ...]:
-    """Every substituted joint of an experiment: one tuple a case (all by default).
+    """The stability margins of all joints whose motors are on beds: one tuple a case (all by default).
 
     The loop is analysed for each joint alone, and compared with the lightest and the heaviest that the arm is in any
     motion of all of them together: their loops are one through the arm.
@@ -139,7 +139,8 @@ def rotor_inertias(experiment: Experiment, case: int) -> np.ndarray:
 
 
 def ends_of_motion(Lambda: np.ndarray, rotors: np.ndarray) -> tuple[float, float]:
-    """The smallest and the largest r of any motion of the substituted joints; not numbers where it is none.
+    """The smallest and the largest r (arm's inertia against the rotor's) of any motion of the joints on beds;
+    not-a-number where the arm has no finite inertia.
 
     Lambda: [..., joint, joint] kg m^2;  rotors: [joint] N^2 J_m, kg m^2
     """
@@ -188,7 +189,8 @@ class BedExperiment:
         return self.loops[joint].of_case(self.inputs_of(case), motor)
 
     def inputs_of(self, case: int) -> dict[str, float]:
-        """The inputs of a case. Any value serves as its noise seed: beds have no faults here."""
+        """The kernel's inputs of a case. Any value serves as its noise seed, since its motor beds have no faults
+        here."""
         cases = self.experiment.cases
         values = {coordinate.path: float(coordinate.values[case]) for coordinate in cases.coordinates}
         return values | dict.fromkeys(cases.noise, 0.0)
@@ -202,7 +204,7 @@ class BedExperiment:
         return tape
 
     def motors(self, tape: PlainTape) -> list[Motor]:
-        """The motors of the joints on beds."""
+        """The motors of the joints whose motors are on beds, in the arm's order."""
         return [self.beds.motor(tape, mounted) for mounted in self.beds.mounted]
 
 
@@ -211,6 +213,8 @@ def _rotor(motor: Motor) -> float:
 
 
 def _margins(on_beds: BedExperiment, case: int, span: tuple[float, float] | None, reach: float) -> Iterator[Margin]:
+    """The stability margin of each joint on a bed in one case, as its run begins. span, reach: as `margins` has
+    them."""
     experiment, builder, beds, known = on_beds.experiment, on_beds.builder, on_beds.beds, on_beds.known
     tape = on_beds.begun(case)
     names = [mounted.joint for mounted in beds.mounted]
@@ -249,7 +253,8 @@ def _margins(on_beds: BedExperiment, case: int, span: tuple[float, float] | None
 
 
 def _around(known: _Known, own: tuple[float, float], searched: tuple[float, float]) -> tuple[float, float | None]:
-    """The stretch around the heavier of the arm's own r, else the nearest to it; (0, 0) where there is none.
+    """The range of r in which the loop is stable around the heavier end of the arm's own r, else the nearest to it; (0,
+    0) where there is none.
 
     At its own r it is as the loop is there, also where the search has gone past a narrow stretch.
     """
@@ -263,6 +268,7 @@ def _around(known: _Known, own: tuple[float, float], searched: tuple[float, floa
         ranges = stretches(loop, looked_at, grow(loop, looked_at))
 
     def near(stretch: tuple[float, float | None]) -> float:
+        """How near a range of r is to the arm's own, from 0 to 1 (within)."""
         lower, limit = stretch
         if own[1] <= lower:
             return own[1] / lower if lower > 0.0 else 1.0
@@ -287,7 +293,8 @@ def grow(loop: CaseLoop, ratios: Sequence[float]) -> list[bool]:
 
 
 def stretches(loop: CaseLoop, looked_at: Sequence[float], growing: Sequence[bool]) -> _Stretches:
-    """The ranges of r in which a loop does not grow, rising, to a thousandth of r.
+    """The ranges of r, the arm's inertia at the joint against the rotor's, in which a bed's loop does not grow, rising,
+    to a thousandth of r.
 
     A range begins at 0 where the loop does not grow at the smallest r that was looked at, and ends at None where it
     does not at the largest. looked_at: rising; growing: of each of them

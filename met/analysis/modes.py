@@ -214,6 +214,7 @@ def slowest(
 
 
 def _fits(mode: Mode, h: float, steps: int, follows: bool) -> bool:
+    """True where a mode grows by no more than it may in `steps` steps of h s; follows: and is followed by them"""
     if mode.grown(h, steps) > np.log1p(FITS):
         return False
     run, truth, _ = mode.missed(h, steps)

@@ -81,8 +81,8 @@ def instants(experiment: Experiment) -> int:
 
 
 def telling(experiment: Experiment, memory: np.ndarray, cells: Sequence[str], count: int) -> np.ndarray:
-    """Places of `count` of a case's instants: where a joint is at its ends, or fastest, and others evenly; always with
-    the one that follows.
+    """Places of those `count` instants of a case that say most about its steps: where a joint is at its ends, or
+    fastest, and others evenly; each with the instant after it.
 
     memory  [instant, cell]
     """
@@ -186,7 +186,8 @@ class _Seen:
         return candidates
 
     def fast(self) -> list[_Candidate]:
-        """Modes for which the step is long."""
+        """Modes whose rate is too fast for the step, |root| h above `FAST`, for longer than some steps: at their worst
+        instants."""
         by_lane = self._passing(lambda mode, _: abs(mode.root) * self.h > FAST * (1.0 + 1e-6))
         candidates = []
         for owner, first, last in _lasting_ones(by_lane, self.stretches):
@@ -222,8 +223,8 @@ def _over(growths: Sequence[float], times: np.ndarray, length: float) -> float:
 
 
 def lasting_beds(experiment: Experiment, passed: Passed) -> list[tuple[Margin, float]]:
-    """The joints on beds that are unstable with the heaviest or the lightest arm that neighbouring instants of a case
-    both show, and the first of these, s; joints that are unstable in the starting pose are left out."""
+    """The joints whose motor on a bed is unstable with the heaviest or the lightest arm that neighbouring instants of a
+    case both show, and the first of these instants, s. Joints that are unstable in the starting pose are left out."""
     if not experiment.structure.substitutions:
         return []
     Lambda = Linearizer(experiment, passed.case.tolist(), passed.memory).loads()
@@ -311,7 +312,7 @@ def _loops(
 
 
 def _news(experiment: Experiment, findings: Sequence[Lasting]) -> tuple[Lasting, ...]:
-    """The findings of kinds that the starting poses do not show: the check has reported those."""
+    """The findings of those kinds that the starting poses do not show; the check has reported the others."""
     if not findings:
         return ()
     begun = step_size(experiment, chosen_cases(experiment))

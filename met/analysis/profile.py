@@ -223,6 +223,7 @@ def _chains() -> tuple[Work, int]:
             tape.write(f"x{i}", tape.input("x") + float(i))
 
     def tick(tape: Tape) -> None:
+        """Record chains of fused multiply-adds that do not wait for each other, to measure a core's peak."""
         values = [tape.read(f"x{i}") for i in range(chains)]
         for _ in range(length):
             values = [fma(value, 0.75, 0.5) for value in values]
@@ -381,6 +382,7 @@ def _alone(kernel: Kernel, number: int, state: Block) -> Work:
     alone = backends.find().load(single, lanes=kernel.lanes, inline=False).block(state.inputs.T)
 
     def work() -> None:
+        """Run the section `_CALLS` times from copies of the state, several times."""
         for _ in range(_STARTS):
             alone.state[:] = state.state
             if section.records:

@@ -86,7 +86,7 @@ class ShaftWork:
 
 
 def substitution_of(experiment: Experiment, joint: str) -> Substitution | None:
-    """The joint's substitution in the deck; None where its motor is on no bed."""
+    """The joint's substitution in the deck (its bed and law); None where its motor is on no bed."""
     return next((use for use in experiment.structure.substitutions if use.joint == joint), None)
 
 
@@ -96,8 +96,8 @@ def servo_of(experiment: Experiment, joint: str) -> ServoUse | None:
 
 
 def not_for_a_bed(experiment: Experiment, use: ServoUse) -> tuple[str, str] | None:
-    """The reason why no bed can take the place of a servo's motor, as words after `the servo of joint NAME`, and a
-    remedy; None where one can."""
+    """The reason why a servo's motor cannot be tested on a motor bed, as words after `the servo of joint NAME`, and a
+    remedy; None where it can."""
     model = models.find("servo", use.model, use.place)
     if not models.has_motor(model):
         known = sorted(name for name, servo in models.available("servo").items() if models.has_motor(servo))
@@ -160,7 +160,7 @@ def _recording(experiment: Experiment, joint: str, names: Sequence[str]) -> Expe
 
 
 def drive_of(use: Substitution) -> DriveCommand:
-    """The quantity that the drive of a joint's bed is commanded."""
+    """The quantity that the drive of a joint's motor bed is commanded: a voltage, a torque or a rate."""
     drive: DriveCommand = models.find("bed", use.bed, use.place).drive
     return drive
 
@@ -175,6 +175,8 @@ def _names(experiment: Experiment, joint: str) -> tuple[str, ...]:
 
 
 def _block(experiment: Experiment, joint: str, results: Any, rows: np.ndarray) -> ShaftWork:
+    """The work of a joint's two motors on a bed in these rows of the case table. results: of a run that recorded the
+    signals of `_names`."""
     signals = {name: results.signals[f"{joint}.{name}"] for name in _names(experiment, joint)}
     use = substitution_of(experiment, joint)
     motor = motor_of(experiment, joint, rows)
@@ -223,7 +225,7 @@ def _block(experiment: Experiment, joint: str, results: Any, rows: np.ndarray) -
 
 
 def scale_of(experiment: Experiment, joint: str, rows: np.ndarray) -> BedScale:
-    """The scales of a joint's bed, each [case, 1]; 1 where it has none."""
+    """The scales between a joint's motor and the one on its bed, each [case, 1]; 1 where the deck has none."""
     use = substitution_of(experiment, joint)
     if use is None or not use.scaled:
         return BedScale()
@@ -260,8 +262,8 @@ def parameter(experiment: Experiment, path: str, rows: np.ndarray) -> np.ndarray
 
 
 def on_bed(experiment: Experiment, joint: str, *, delay: int) -> Experiment:
-    """The experiment with the joint's motor on an emulated bed without faults, with all defaults; unchanged where the
-    deck has a bed. The law is that of the other joints on beds, where there are some."""
+    """The experiment with the joint's motor on an emulated motor bed without faults, with all defaults; unchanged where
+    the deck has a bed. The law is that of the other joints on beds, where there are some."""
     if substitution_of(experiment, joint) is not None:
         return experiment
     from met.substitution import BEDS, LAWS

@@ -260,6 +260,7 @@ def _largest(sampled: SampledLoops, lanes: np.ndarray, gains: dict[str, float] |
 
 
 def _factors(down: float | None, up: float | None) -> Iterator[float]:
+    """The factors above 1 by which a gain may rise, and fall."""
     if up is not None:
         yield up
     if down:

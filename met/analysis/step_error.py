@@ -100,6 +100,7 @@ def refine(experiment: Experiment, factor: int) -> Experiment:
 
 
 def _refine(structure: Structure, factor: int) -> Structure:
+    """The structure with steps of the dynamics that are `factor` times shorter. All else keeps its instants in time."""
     schedule = structure.schedule
     faster = factor // gcd(schedule.dynamics, factor)  # new base ticks in an old one
     step = schedule.dynamics * faster // factor

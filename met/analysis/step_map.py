@@ -205,7 +205,7 @@ class Linearizer:
             return tuple(laws.gains(self.builder, actuator, self.tape.only(self.loose)))
 
     def loads(self) -> np.ndarray:
-        """Effective inertias of the joints whose motors are on beds, as the run has them, kg m^2 (prismatic: kg):
+        """Inertias of the arm at the joints whose motors are on beds, as the run has them, kg m^2 (prismatic: kg):
         [lane, joint, joint]; all other joints keep their modes."""
         with np.errstate(all="ignore"):
             Lambda, _ = self.builder.step.loads(self.tape)

@@ -20,6 +20,7 @@ from met.trace import Real, absolute, both, clip, cos, exp, log, sin, tanh, wher
 
 
 def course(p: Any, t: Real) -> tuple[Real, Real]:
+    """The commanded value and its rate at time `t`, s."""
     s = clip(t - p.begin, 0.0, p.over)
     if p.growth == "linear":
         gain = (p.f1 - p.f0) / p.over
@@ -48,7 +49,8 @@ def _mean_of_exp(x: Real) -> Real:
 
 
 def content(p: Any, duration: float) -> Content:
-    """The content of the course: its fastest swing is at one of its ends, or where the run ends before."""
+    """What the chirp asks of the sampling in time: its fastest swing is at one of its ends, or where the run ends
+    before."""
     if p.amplitude == 0.0:
         return NEVER
     done = min(max(duration - p.begin, 0.0) / p.over, 1.0)

@@ -47,7 +47,7 @@ class Profile(Declaration):
     from_file: bool = False
 
     def jump(self, p: Any) -> Jump:
-        """The part of the course that may jump with these parameters: `value`, `rate` or `none`."""
+        """The part of the command in time that may jump with these parameters: `value`, `rate` or `none`."""
         return self.jumps(p) if callable(self.jumps) else self.jumps
 
     @property

@@ -20,6 +20,7 @@ from met.trace import Real, absolute, both, clip, maximum, minimum, where
 
 
 def course(p: Any, t: Real) -> tuple[Real, Real]:
+    """The commanded value and its rate at time `t`, s."""
     rise = absolute(p.to - p.start) / p.slope
     done = clip(t - p.begin, 0.0, p.over)
     left = p.over - done
@@ -38,6 +39,7 @@ def shortest(p: Any) -> Real:
 
 
 def content(p: Any, duration: float) -> Content:
+    """What the pulse asks of the sampling in time: its corners."""
     if p.to == p.start:
         return NEVER
     rise = min(abs(p.to - p.start) / p.slope, 0.5 * p.over)

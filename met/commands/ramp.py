@@ -11,6 +11,7 @@ from met.trace import Real, both, clip, where
 
 
 def course(p: Any, t: Real) -> tuple[Real, Real]:
+    """The commanded value and its rate at time `t`, s."""
     slope = (p.to - p.start) / p.over
     share = clip((t - p.begin) / p.over, 0.0, 1.0)
     moving = both(t >= p.begin, t < p.begin + p.over)

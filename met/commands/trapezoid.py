@@ -21,6 +21,7 @@ from met.trace import Real, absolute, clip, maximum, minimum, sqrt, where
 
 
 def course(p: Any, t: Real) -> tuple[Real, Real]:
+    """The commanded value and its rate at time `t`, s."""
     way = absolute(p.to - p.start)
     towards = where(p.to < p.start, -1.0, 1.0)
     peak = minimum(p.max_rate, sqrt(p.max_acceleration * way))
@@ -40,6 +41,7 @@ def course(p: Any, t: Real) -> tuple[Real, Real]:
 
 
 def content(p: Any, duration: float) -> Content:
+    """What the move asks of the sampling in time: when it begins and ends, s."""
     way = abs(p.to - p.start)
     if way == 0.0:
         return NEVER

@@ -107,9 +107,8 @@ def solve_coupled(tree: Tree, ratios: Ratios, bends: Sequence[Real] = (), **argu
 
 
 def inertia_at(tree: Tree, ratios: Ratios, arguments: Mapping[str, Any], joint: int) -> Real:
-    """The inertia of the arm at a joint that follows none, with all other joints in their modes, kg m^2 (kg):
-    `effective_inertia` with coupled joints. What follows the joint moves with it. arguments: as `solve_coupled`
-    takes them"""
+    """The inertia at a joint that moves by itself, with all that follows it and all other joints in their modes, kg m^2
+    (kg): `effective_inertia` with coupled joints. arguments: as `solve_coupled` takes them"""
     n = len(tree.joints)
     mode = tuple(False if i == joint else mode for i, mode in enumerate(arguments["mode"]))
     unit = tuple(float(i == joint) for i in range(n))
@@ -117,8 +116,8 @@ def inertia_at(tree: Tree, ratios: Ratios, arguments: Mapping[str, Any], joint: 
 
 
 def at_leaders(ratios: Ratios, columns: Sequence[tuple[Vector, Vector]]) -> list[tuple[Vector, Vector]]:
-    """Columns of a Jacobian, angular and linear by joint, for unit rates of the joints that follow none: those of
-    leaders with all that follow them, those of followers zero."""
+    """Columns of a Jacobian, angular and linear by joint, for unit rates of joints that move by themselves, with all
+    that follow each; zeros for those that follow."""
     of_leaders: list[tuple[Vector, Vector]] = []
     for i, own in enumerate(columns):
         total = own if i in ratios[i] or not ratios[i] else (ZERO, ZERO)

@@ -98,6 +98,7 @@ def mobility(LDL: Factors) -> Symmetric:
 
 
 def _entry(M: Symmetric, i: int, j: int) -> Real:
+    """The entry (i, j) of a symmetric 6x6 in blocks."""
     i, j = min(i, j), max(i, j)
     if j < 3:
         return M.A[AT[i][j]]

@@ -117,7 +117,7 @@ class LinearisedDynamics:
         return changes, felt
 
     def _less_inertia(self, torques: Sequence[Real], qdd: Sequence[Real]) -> list[Real]:
-        """torques - M qdd."""
+        """Torques less those of the mass matrix, M qdd, by joint."""
         left = list(torques)
         for (i, j), entry in self.M.items():
             left[i] = left[i] - entry * qdd[j]
@@ -270,7 +270,8 @@ def _factor(tree: Tree, solved: Solved, M: Entries) -> tuple[Entries, list[Real]
 
 
 def _own(tree: Tree, solved: Solved, i: int) -> _Subtree:
-    """The body of joint i alone."""
+    """The inertia, force and their derivative terms of the body that joint i carries, in its frame, without the joints
+    beyond."""
     m, h, J = body = tree.joints[i].dynamic
     w, wd, a = solved.w[i], solved.wd[i], solved.a[i]
     Jw = apply_symmetric(J, w)
@@ -291,7 +292,8 @@ def _own(tree: Tree, solved: Solved, i: int) -> _Subtree:
 
 
 def _revolute(subtree: _Subtree, psi: Vector, more: Vector, a: Vector) -> _Answer:
-    """t1 to t4 of a joint that turns about z; psi, more: the angular parts of psi and psi'."""
+    """The terms t1 to t4 (head of this file) of a joint that turns about z; psi, more: the angular parts of psi and
+    psi'."""
     (m, h, J), E, p = subtree.body, subtree.E, subtree.p
     along = (a[1], -a[0], 0.0)
     rows = (E[0:3], E[3:6], E[6:9])
@@ -315,7 +317,8 @@ def _revolute(subtree: _Subtree, psi: Vector, more: Vector, a: Vector) -> _Answe
 
 
 def _prismatic(subtree: _Subtree, psi: Vector, more: Vector) -> _Answer:
-    """t1 to t4 of a joint that slides along z; psi, more: the linear parts of psi and psi'."""
+    """The terms t1 to t4 (head of this file) of a joint that slides along z; psi, more: the linear parts of psi and
+    psi'."""
     (m, h, _), p, f = subtree.body, subtree.p, subtree.wrench[1]
     twice = scale(2.0, psi)
     return _Answer(
@@ -374,6 +377,8 @@ def tell(tree: Tree, arguments: Mapping[str, Any], solved: Solved) -> None:
         moving["qd"] = (0.0,) * len(tree.joints)
 
     def moves(graph: Nodes) -> Callable[[Tangent], list[int]]:
+        """The derivatives of the recursion's results in a graph, as a function of a tangent (the direction of a
+        derivative)."""
         in_graph = _in_graph((tree, moving, solved), graph)
         derivative = linearised(in_graph[0], in_graph[1]["qd"], in_graph[2])
 

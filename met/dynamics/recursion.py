@@ -373,6 +373,7 @@ def _handed_on(M: Symmetric, k: int, U: Six, Dinv: Real, rest: Real, spin: Real)
     column = U if is_zero(spin) else M.column(k)
 
     def entry(i: int, j: int) -> Real:
+        """The element (i, j) of Ia, the part of the 6x6 inertia that resists the parent."""
         if k in (i, j):
             other = i + j - k
             share = rest * column[other]

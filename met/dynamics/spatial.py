@@ -250,6 +250,8 @@ def raise_turned(axis: int, turn: Turn, M: Symmetric) -> Symmetric:
 
 
 def _turn_symmetric(axis: int, turn: Turn, quarter: int | None, A: Six) -> Six:
+    """R A R' of a symmetric 3x3, R the turn about the axis. quarter: the number of quarter turns; None: any other
+    turn."""
     i, j = _others(axis)
     c, s = turn
     out = list(A)
@@ -268,6 +270,7 @@ def _turn_symmetric(axis: int, turn: Turn, quarter: int | None, A: Six) -> Six:
 
 
 def _turn_general(axis: int, turn: Turn, quarter: int | None, B: Nine) -> Nine:
+    """R B R' of any 3x3, R the turn about the axis. quarter: the number of quarter turns; None: any other turn."""
     i, j = _others(axis)
     k = axis
     c, s = turn

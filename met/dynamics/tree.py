@@ -140,6 +140,8 @@ class _Builder:
     """One building of a tree. `within`, `at` and `_own` are poses among link frames, which are the deck's."""
 
     def __init__(self, bodies: Sequence[Body], moving: Sequence[str] | None) -> None:
+        """Find which bodies are rigid with which moving joint, and its place. moving: names of the joints that move, in
+        the tree's order; None: all that are not fixed, in the bodies' order"""
         self.bodies = list(bodies)
         self.sorted = _parents_first([body.parent for body in bodies])
         names = [body.joint for body in bodies if body.kind != "fixed"] if moving is None else list(moving)
@@ -171,6 +173,8 @@ class _Builder:
             self.first.setdefault(self.parent[i], i)
 
     def tree(self, *, free: bool) -> Tree:
+        """The tree of the bodies: each joint's frame in its parent's, and the inertia of what is rigid with it. free:
+        whether the base moves freely, so that its own inertia counts."""
         own: list[Pose] = [HERE] * len(self.links)
         base = HERE
         joints: list[Joint | None] = [None] * len(self.links)
@@ -308,7 +312,7 @@ def _split(pose: Pose) -> tuple[Turn, Vector, Turn, Turn, Real]:
 
 
 def _direction(x: Real, y: Real) -> Turn:
-    """(x, y) as a unit vector; (1, 0) where it has no length."""
+    """The direction (x, y) as a unit vector; (1, 0) where it has no length."""
     size = x * x + y * y
     nothing = size < 1e-30
     length = root(choose(nothing, 1.0, size))

@@ -41,6 +41,7 @@ def _wanted(p: Any, world: World) -> list[Real]:
 
 
 def _limit(number: int) -> Limit:
+    """The limit of the moment about one axis, number 0 to 2."""
     return Limit(
         parameter=f"limit.{'xyz'[number]}",
         reached=lambda p, world: absolute(_wanted(p, world)[number]) >= p.limit[number],

@@ -53,6 +53,7 @@ from met.vectors import (
 
 
 def loads(p: Any, world: World) -> Loads:
+    """Force and moment of the bushing on both links, N and N m in the world."""
     other, apart, along, about = _felt(p, world)
     force, moment = turn_vector(other, along), turn_vector(other, about)
     back = scale(-1.0, add(moment, cross(apart, force)))

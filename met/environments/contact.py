@@ -33,6 +33,7 @@ bodies meet. It is 4/5 B(2/5, 1/2)."""
 
 
 def loads(p: Any, world: World) -> Loads:
+    """The force with which the two bodies press and rub on each other, N in the world, on both links."""
     touching = touch(p, world)
     press = _press(p, touching)
     force = scale(press, touching.normal)
@@ -47,7 +48,7 @@ def show(p: Any, world: World) -> Mapping[str, Any]:
 
 
 def touch(p: Any, world: World) -> Touch:
-    """Where the two bodies touch, or would."""
+    """Where and how fast two bodies touch, or would: normal, depth (m), approach (m/s), in the world."""
     way = sub(world.position(p.link, p.at), world.position(p.to, p.to_at))
     if p.surface == "plane":
         normal = world.to_world(p.to, scale(1.0 / sqrt(dot(p.normal, p.normal)), p.normal))
@@ -86,7 +87,7 @@ def idle(p: Any, duration: float) -> tuple[tuple[str, ...], str] | None:
 
 
 def _press(p: Any, touching: Touch) -> Real:
-    """N."""
+    """The size of the force that presses the two bodies apart where they touch, N; 0 where they do not."""
     inside = touching.depth > 0.0
     depth = where(inside, touching.depth, 0.0)
     if p.law == "linear":
@@ -97,7 +98,8 @@ def _press(p: Any, touching: Touch) -> Real:
 
 
 def _radius(p: Any) -> Real:
-    """R, m."""
+    """The radius R of the contact, m: of a sphere on a plane the sphere's, of two spheres their product over their
+    sum."""
     if p.surface == "plane":
         radius: Real = p.radius
         return radius

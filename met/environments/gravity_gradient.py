@@ -69,7 +69,7 @@ def _acceleration(p: Any, field: Matrix, turning: Vector, position: Vector, velo
 
 
 def _on_link(p: Any, world: World, link: str, field: Matrix, turning: Vector) -> Force:
-    """`field` and `turning` of `_around`, in the link's terms."""
+    """The results `field` and `turning` of `_around`, in the link's terms."""
     mass, com = world.mass(link), world.com(link)
     second = _second_moments(world, link)
     acceleration = _acceleration(p, field, turning, world.position(link, com), world.velocity(link, com))

@@ -92,6 +92,8 @@ FLAT = 1e-9  # m: a nozzle in the plate's plane counts as so far before it, wher
 
 
 def loads(p: Any, world: World) -> Loads:
+    """Force and moment of the gas on the plate, and where `reaction` is on the thrust on the nozzle's link, N and N m
+    in the world."""
     fires = firing.share(p, world)
     turn = product(world.orientation(p.link), rotation_rpy(*p.rpy))
     nozzle = sub(world.position(p.nozzle_link, p.nozzle), world.position(p.link, p.at))
@@ -105,6 +107,7 @@ def loads(p: Any, world: World) -> Loads:
 
 
 def jet(p: Any, world: World) -> Jet:
+    """The jet of gas and the plate, for pictures."""
     R = rotation_rpy(*p.rpy)
     width, height = turn_vector(R, (p.width, 0.0, 0.0)), turn_vector(R, (0.0, p.height, 0.0))
     plate = Plate(p.link, p.at, width, height)
@@ -177,7 +180,8 @@ def idle(p: Any, duration: float) -> tuple[tuple[str, ...], str] | None:
 
 
 def _on_direction(p: Any, u: Vector, side: Real, axis: Vector) -> Vector:
-    """(P2) for each solid angle and K, in the plate's axes, for gas that comes along u."""
+    """The force of the gas that comes along u, for each solid angle and K ((P2) of this file's head), in the plate's
+    axes."""
     cosine = dot(u, axis)
     behind = cosine <= 0.0
     dense = where(behind, 0.0, exp(p.exponent * log(where(behind, 1.0, cosine))))

@@ -18,6 +18,7 @@ from met.vectors import dot, scale, sub
 
 
 def loads(p: Any, world: World) -> Loads:
+    """Pull of the spring and damper on both of its ends, N, in the world."""
     way = sub(world.position(p.to, p.to_point), world.position(p.link, p.point))
     apart = sqrt(dot(way, way))
     along = scale(1.0 / where(apart == 0.0, 1.0, apart), way)

@@ -16,6 +16,7 @@ from met.vectors import Vector, scale
 
 
 def loads(p: Any, world: World) -> Loads:
+    """The force and moment on the link, N and N m in the world, for the share of the step in their window."""
     acting = share(world, getattr(p, "from"), p.until)
 
     def felt(vector: Vector) -> Vector:

@@ -30,6 +30,8 @@ NAMES = tuple(f"{kind}_{axis}" for kind in ("force", "moment") for axis in "xyz"
 
 
 def loads(p: Any, world: World) -> Loads:
+    """The force and moment of the table on the link now, N and N m in the world."""
+
     def triple(kind: str) -> Vector:
         x, y, z = (_value_now(p, getattr(p, f"{kind}_{axis}"), world) for axis in "xyz")
         return world.to_world(p.link, (x, y, z)) if p.axes == "link" else (x, y, z)
@@ -53,6 +55,8 @@ def idle(p: Any, duration: float) -> tuple[tuple[str, ...], str] | None:
 
 
 def _value_now(p: Any, values: tuple[float, ...], world: World) -> Real:
+    """The table's value at this stage of a step: on the line between rows, or the mean over the step where a row lies
+    within it."""
     if len(values) < 2:
         return values[0] if values else 0.0
     value = linear(p.times, values, world.time - p.begin)[0]

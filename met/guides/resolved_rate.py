@@ -107,6 +107,7 @@ def _factors(square: Rows, more: Real) -> tuple[Rows, list[Real]]:
 
 
 def _solved(factors: tuple[Rows, list[Real]], right: Sequence[Real]) -> list[Real]:
+    """The solution x of L D L' x = right, from L and the inverse of D."""
     L, inverse = factors
     x: list[Real] = []
     for i, value in enumerate(right):
@@ -149,6 +150,8 @@ def idle(p: Any, duration: float) -> tuple[tuple[str, ...], str] | None:
 
 
 def steer(p: Any, joints: Sequence[Any], seen: Sight) -> Steered:
+    """The rates that the guide commands its joints at its tick, with its memory: the errors of position (m) and
+    attitude (rad), the least singular value and the damping (m), and the share of the rates that limits leave."""
     rows = [POSE.index(name) for name in GUIDED[p.guides]]
     turns = p.guides == "pose"
     answers = p.jacobian == "generalized"

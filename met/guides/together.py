@@ -23,6 +23,8 @@ from met.trace import Real, absolute, maximum, where
 
 
 def course(p: Any, joints: Sequence[Any], begins: Sequence[Real], t: Real) -> list[tuple[Real, Real]]:
+    """Position and rate of each joint's command at time `t`, s; rad and rad/s, of a prismatic joint m and m/s. begins:
+    the joints' positions at the start."""
     ways = [joint.to - begin for joint, begin in zip(joints, begins, strict=True)]
     slow: Real = 0.0  # 1/limit of the rate of s, and of its second derivative
     late: Real = 0.0

@@ -135,6 +135,7 @@ def read(path: Path) -> bytes | None:
 
 
 def _read(path: Path) -> bytes | None:
+    """The code of a cached file; None where the file is missing, not ours, or damaged."""
     data = read(path)
     if data is None or not data.startswith(_MARK):
         return None
@@ -143,6 +144,7 @@ def _read(path: Path) -> bytes | None:
 
 
 def _write(path: Path, code: bytes) -> None:
+    """Write compiled code into the cache whole or not at all, with a mark and a checksum."""
     handle, name = tempfile.mkstemp(dir=path.parent, prefix=".new-")
     try:
         with os.fdopen(handle, "wb") as file:

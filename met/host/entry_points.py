@@ -75,7 +75,7 @@ def _tables() -> Iterator[tuple[str, str]]:
 
 
 def _in_table(text: str, group: str) -> Iterator[tuple[str, str]]:
-    """(name, value) of one group of an entry_points.txt."""
+    """Pairs (name, value) of one group of an entry_points.txt."""
     inside = False
     for line in text.splitlines():
         line = line.strip()
@@ -87,7 +87,7 @@ def _in_table(text: str, group: str) -> Iterator[tuple[str, str]]:
 
 
 def _in_setup_cfg(text: str, group: str) -> Iterator[tuple[str, str]]:
-    """(name, value) of one group of the section [options.entry_points]."""
+    """Pairs (name, value) of one group of the section [options.entry_points] of a setup.cfg."""
     section, key = "", ""
     for line in text.splitlines():
         if line.startswith("["):

@@ -72,8 +72,8 @@ def open_regular(path: str | os.PathLike[str]) -> BufferedReader:
 
 
 def read_regular(path: str | os.PathLike[str], most: int | None = None) -> bytes:
-    """The contents of a regular file. most: its largest size in bytes; by default, as much as memory has room for.
-    Raises OSError."""
+    """The contents of a regular file. most: its largest size in bytes; by default, what fits in memory. Raises
+    OSError."""
     limit = memory() if most is None else most
     with open_regular(path) as file:
         large = os.fstat(file.fileno()).st_size > limit  # a sparse file may be larger than any disk
@@ -185,6 +185,7 @@ def is_count(value: Any, most: float = math.inf) -> bool:
 
 
 def _check_regular(about: os.stat_result, name: str) -> None:
+    """Raise OSError unless this status is that of a regular file."""
     if stat.S_ISDIR(about.st_mode):
         raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), name)
     if not stat.S_ISREG(about.st_mode):

@@ -23,6 +23,7 @@ class Revision:
     """Git's answer about MET's own source, asked for at once and read later."""
 
     def __init__(self) -> None:
+        """Start `git describe` on MET's own source; nothing is started where that is no checkout."""
         self._process: subprocess.Popen[str] | None = None
         home = Path(__file__).resolve().parents[2]
         if not (home / ".git").exists():

@@ -18,6 +18,7 @@ from met.trace import Real
 
 
 def advance(slope: Callable[[float, Motion], Slope], h: Real, y: Motion, k1: Slope) -> Motion:
+    """The state after a step of h s by the classical method of order 4. k1: the slope at its start"""
     k2 = slope(0.5, ahead(y, 0.5 * h, k1))
     k3 = slope(0.5, ahead(y, 0.5 * h, k2))
     k4 = slope(1.0, ahead(y, h, k3))

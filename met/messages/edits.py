@@ -51,6 +51,8 @@ def apply(edit: Edit, text: str) -> str:
 
 
 def _edit(change: TextChange, place: Place, sources: Mapping[str, str]) -> Edit | None:
+    """The edit of a text change at a place; None where the text is not the user's own, has another word there, or comes
+    from a macro or one turn of a loop."""
     text = sources.get(place.file)
     if text is None or place.file.startswith("<") or shown_place(place) is not place:
         return None
@@ -108,6 +110,7 @@ def _starts(text: str) -> list[int]:
 
 
 def _between(file: str, starts: list[int], first: int, last: int, new: str) -> Edit:
+    """The edit of the characters from `first` to `last` of a file, by lines and columns. starts: offsets of lines"""
     from bisect import bisect_right
 
     line, end_line = bisect_right(starts, first), bisect_right(starts, last)

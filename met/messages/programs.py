@@ -50,6 +50,7 @@ def to_json(
 
 
 def _diagnostic_json(diagnostic: Diagnostic, sources: Mapping[str, str]) -> dict[str, Any]:
+    """A diagnostic for JSON, with its places and the edits of its helps."""
     label = diagnostic.at
     return {
         "code": diagnostic.code,
@@ -64,6 +65,7 @@ def _diagnostic_json(diagnostic: Diagnostic, sources: Mapping[str, str]) -> dict
 
 
 def _edit_json(edit: Edit) -> dict[str, Any]:
+    """An edit for JSON: the stretch, by lines and columns from 1, and its new text."""
     return {
         "file": edit.file,
         "line": edit.line,
@@ -79,6 +81,7 @@ def _label_json(label: Label) -> dict[str, Any]:
 
 
 def _place_json(place: Place) -> dict[str, Any]:
+    """A place for JSON, with the macros, loops and includes that it came through."""
     record: dict[str, Any] = {"file": place.file, "line": place.line, "column": place.column, "length": place.length}
     if place.macros:
         record["expansions"] = [{"macro": step.macro, "use": _place_json(step.use)} for step in place.macros]
@@ -138,6 +141,8 @@ def to_sarif(
 
 
 def _result(diagnostic: Diagnostic, sources: Mapping[str, str], rule: int) -> dict[str, Any]:
+    """A diagnostic as a result of SARIF, with the edits that carry out its help. rule: position of its code among the
+    rules."""
     helps = "".join(f"\nhelp: {text}" for text in diagnostic.help)
     result: dict[str, Any] = {
         "ruleId": diagnostic.code,
@@ -166,6 +171,7 @@ def _result(diagnostic: Diagnostic, sources: Mapping[str, str], rule: int) -> di
 
 
 def _location(place: Place, text: str) -> dict[str, Any]:
+    """A place as a location of SARIF. text: the message about it."""
     location: dict[str, Any] = {}
     if _is_of_the_command_line(place.file):
         location["logicalLocations"] = [{"name": place.file}]
@@ -195,6 +201,7 @@ def _is_of_the_command_line(file: str) -> bool:
 
 
 def _fix(text: str, edit: Edit) -> dict[str, Any]:
+    """An edit as a fix of SARIF. text: the help that it carries out"""
     region = _region(edit.line, edit.column, edit.end_line, edit.end_column)
     replacement = {"deletedRegion": region, "insertedContent": {"text": edit.text}}
     changes = [{"artifactLocation": _artifact(edit.file), "replacements": [replacement]}]
@@ -215,6 +222,7 @@ def to_github(diagnostics: Iterable[Diagnostic]) -> str:
 
 
 def _command(diagnostic: Diagnostic) -> str:
+    """A diagnostic as a workflow command of GitHub Actions, one line."""
     properties: dict[str, object] = {}
     about = ""
     if diagnostic.at is not None:

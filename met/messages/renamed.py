@@ -30,6 +30,7 @@ def old_fields(**names: str) -> Callable[[C], C]:
     too."""
 
     def decorate(cls: C) -> C:
+        """The class with its fields' old names, to be given and read, each with a DeprecationWarning."""
         make = cls.__init__  # type: ignore[misc]
 
         @functools.wraps(make)

@@ -70,6 +70,8 @@ class _Paint:
 
 
 def _block(diagnostic: Diagnostic, lines: Mapping[str, list[str]], paint: _Paint) -> str:
+    """A diagnostic as text for a terminal, with the line of its place and a mark below. lines: of the files, by
+    name."""
     head = paint(diagnostic.severity, f"{diagnostic.severity}[{diagnostic.code}]")
     out = [head + paint("bold", f": {_safe(diagnostic.message)}")]
     own_label = diagnostic.at
@@ -118,6 +120,7 @@ def _came_in(place: Place) -> list[str]:
 
 
 def _cut(steps: list[str], what: str) -> list[str]:
+    """The first and last of many lines, with a count of those between."""
     if len(steps) <= MOST_STEPS:
         return steps
     half = MOST_STEPS // 2

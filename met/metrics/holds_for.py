@@ -18,6 +18,8 @@ from met.trace import Real, both, maximum, where
 
 
 def update(p: Any, held: Any, x: Real, t: Real, dt: Real) -> Mapping[str, Real]:
+    """The memory after a sample x, the condition's margin, at t, s: steps that it holds on end, and the longest time,
+    s."""
     seen = inside(p, t)
     steps = where(both(seen, x >= 0.0), held.steps + 1.0, -1.0)
     longest = maximum(held.longest, maximum(steps, 0.0) * dt)

@@ -149,6 +149,8 @@ def furthest(metric: Metric) -> Metric | None:
     sign = -1.0 if start == math.inf else 1.0
 
     def update(p: Any, held: Any, x: Real, t: Real, dt: Real) -> Mapping[str, Real]:
+        """The memory of the metric after a sample x at t, s, taken as far as the signal may have gone between
+        samples."""
         own = {memory.name: getattr(held, memory.name) for memory in metric.memory}
         new = dict(metric.update(p, held, x, t, dt))
         alone = metric.update(p, Held(**own | {name: start}), x, t, dt)[name]

@@ -14,6 +14,7 @@ from met.trace import Real, sqrt
 
 
 def update(p: Any, held: Any, x: Real, t: Real, dt: Real) -> Mapping[str, Real]:
+    """The memory after a sample x at t, s: the sum of squares and the count in the window."""
     return {
         "squares": after_sample(p, t, held.squares + x * x, held.squares, 0.0),
         "count": after_sample(p, t, held.count + 1.0, held.count, 0.0),

@@ -19,6 +19,7 @@ MEMORY = (
 
 
 def update(p: Any, held: Any, x: Real, t: Real, dt: Real) -> Mapping[str, Real]:
+    """The memory after a sample x, the condition's margin, at t, s: samples in the window, and those where it holds."""
     seen = inside(p, t)
     return {
         "met": held.met + where(both(seen, x >= 0.0), 1.0, 0.0),

@@ -52,6 +52,7 @@ class CovarianceAdaptation:
         self._set_rates(n)
 
     def _set_rates(self, n: int) -> None:
+        """Set the weights and rates of learning for `n` dimensions, by Hansen's table 1."""
         count = self.population
         raw = np.array([logarithm((count + 1) / 2) - logarithm(rank + 1) for rank in range(count)])
         positive, negative = np.maximum(raw, 0.0), np.minimum(raw, 0.0)

@@ -125,6 +125,7 @@ class BoxDivision:
         return len(self._batch) > before
 
     def _cut(self, box: int) -> None:
+        """Cut a box into three along its longest edge, and ask for the values at the centres of the two outer ones."""
         cuts = self._cuts[box].copy()
         longest = np.flatnonzero(cuts == cuts.min())
         along = int(longest[np.argmin(self._cut_along[longest])])

@@ -194,6 +194,8 @@ def ratio_unit(kind: str, leader_kind: str) -> str:
 
 @lru_cache(maxsize=4096)
 def _unit_of(unit: str, slides: bool, command: str | None) -> str:
+    """A channel's unit at a joint, from the declared one with placeholders. slides: whether the joint is prismatic;
+    command: the kind of its servo's command, None where it does not matter."""
     replacements = SLIDING if slides else TURNING
     if command is not None:
         replacements = {**replacements, "command": _unit_of(COMMAND_UNIT[command], slides, None)}

@@ -127,6 +127,7 @@ def _check_requirements(experiment: Experiment, where: str) -> None:
 
 
 def _check_step_errors(experiment: Experiment, where: str) -> None:
+    """Check that limits of errors by the step are of metrics, above 0, and differ in text. Raises Damaged."""
     metrics = {use.name for use in experiment.structure.metrics}
     for index, limit in enumerate(experiment.step_errors):
         if limit.metric not in metrics:
@@ -138,6 +139,7 @@ def _check_step_errors(experiment: Experiment, where: str) -> None:
 
 
 def _check_tolerances(experiment: Experiment, where: str) -> None:
+    """Check that tolerances are of signals or metrics, at least 0, and one each. Raises Damaged."""
     known = tolerable(experiment.structure, experiment.linear_metrics) if experiment.tolerances else {}
     for index, tolerance in enumerate(experiment.tolerances):
         if tolerance.of not in known:
@@ -149,6 +151,7 @@ def _check_tolerances(experiment: Experiment, where: str) -> None:
 
 
 def _check_allowances(experiment: Experiment, where: str) -> None:
+    """Check that allowed warnings have codes and reasons, once each. Raises Damaged."""
     for index, allowance in enumerate(experiment.allowances):
         if not CODE.fullmatch(allowance.code):
             raise Damaged(f"{where}[{index}].code", f"{allowance.code!r} is no code of a warning")
@@ -193,6 +196,8 @@ def _check_until_shown(experiment: Experiment, where: str) -> None:
 
 
 def _check_numbering(column: CaseValues, count: int, rising: bool, where: str) -> None:
+    """Check a column of a case table that holds whole numbers, such as repeats. rising: whether each must be above the
+    one before. Raises Damaged."""
     if column.shape != (count,):
         raise Damaged(where, f"there are {column.size} for {count} cases")
     before = -1.0
@@ -207,6 +212,7 @@ def _check_numbering(column: CaseValues, count: int, rising: bool, where: str) -
 
 
 def _check_coordinate(experiment: Experiment, coordinate: Coordinate, where: str) -> None:
+    """Check that a varied parameter has a value for each case and sets parameters that there are. Raises Damaged."""
     if coordinate.values.shape != (experiment.cases.count,):
         raise Damaged(f"{where}.values", f"there are {coordinate.values.size} for {experiment.cases.count} cases")
     if not 0.0 < coordinate.scale < math.inf:
@@ -364,6 +370,7 @@ def _is_whole(values: np.ndarray) -> np.ndarray:
 
 
 def _same_unit(unit: str, other: str) -> bool:
+    """True if two units have the same size and dimension; False where one cannot be read."""
     try:
         mine, theirs = parse_unit(unit), parse_unit(other)
     except ValueError:

@@ -68,8 +68,8 @@ MOST_SEED = 2**53
 
 
 def check_search(experiment: Experiment, search: Search, where: str) -> None:
-    """Check that a search fits its run: its goal is a metric, its parameters and its plants are the coordinates, and
-    its generations make up the case table."""
+    """Check that a search fits its run: its goal is a metric, its parameters and its plants (the cases that a tuning
+    judges candidates on) are the coordinates, and its generations make up the case table. Raises Damaged."""
     if search.metric not in {use.name for use in experiment.metrics}:
         raise Damaged(f"{where}.metric", f"there is no metric `{search.metric}`")
     check_whole(search.at_most, 1, MOST_SEARCHED, f"{where}.at_most")
@@ -113,6 +113,8 @@ def check_search(experiment: Experiment, search: Search, where: str) -> None:
 
 
 def _check_parameters(experiment: Experiment, search: Search, where: str) -> None:
+    """Check that a search's parameters are the first coordinates of its cases, and have ends that can be searched.
+    Raises Damaged."""
     paths = [coordinate.path for coordinate in experiment.cases.coordinates]
     if not search.parameters:
         raise Damaged(where, "there is none")
@@ -133,6 +135,8 @@ def _check_parameters(experiment: Experiment, search: Search, where: str) -> Non
 
 
 def _check_plants(experiment: Experiment, search: Search, where: str) -> None:
+    """Check the plants of a tuning, which are the cases of the sweep that it judges candidates on: each has one finite
+    number for each coordinate that is not chosen. Raises Damaged."""
     more = len(experiment.cases.coordinates) - len(search.parameters)
     if bool(search.plants) != bool(search.against) or bool(search.plants) != (more > 0):
         raise Damaged(where, "they should be of the coordinates that are not chosen, and of a sweep")

@@ -68,6 +68,7 @@ def encode(hint: Any, value: Any) -> Any:
 
 
 def _encode_fields(cls: Any, value: Any) -> dict[str, Any]:
+    """The fields of a dataclass for JSON, without those that have their default."""
     out = {}
     for name, hint, default in fields(cls):
         part = getattr(value, name)
@@ -78,6 +79,7 @@ def _encode_fields(cls: Any, value: Any) -> dict[str, Any]:
 
 
 def _encode_quantity(value: Any) -> Any:
+    """The value of a parameter for JSON: a number, a list, a word or a formula's number."""
     if isinstance(value, Formula):
         return {"formula": int(value.output)}
     if isinstance(value, str):
@@ -145,6 +147,7 @@ def _decode_fields(cls: Any, data: Any, where: str, fetch: Fetch | None) -> Any:
 
 
 def _quantity(data: Any, where: str) -> Any:
+    """The value of a parameter from JSON: a number, a list, a word or a formula's number. Raises Damaged."""
     if isinstance(data, dict):
         if set(data) == {"formula"} and type(data["formula"]) is int:
             return Formula(data["formula"])
@@ -196,6 +199,7 @@ def _is_number(value: Any) -> bool:
 
 
 def _number(data: Any, where: str) -> float:
+    """A number from JSON; `inf`, `-inf` and `nan` are words there. Raises Damaged."""
     if isinstance(data, str) and data in NOT_FINITE:
         return NOT_FINITE[data]
     _expect(type(data) in (int, float), where, "a number")
@@ -206,6 +210,7 @@ def _number(data: Any, where: str) -> float:
 
 
 def _array(data: Any, where: str, fetch: Fetch | None) -> CaseValues:
+    """An array from JSON, or by a reference to where it is kept. Raises Damaged."""
     if isinstance(data, dict):
         if fetch is None:
             raise Damaged(where, "its values are kept elsewhere")

@@ -51,6 +51,7 @@ class ComputedColumn:
         return self.size
 
     def __getitem__(self, key: Any) -> Any:
+        """The numbers of these rows, computed now. key: as of a numpy array of one dimension."""
         if isinstance(key, slice):
             return self.at(np.arange(*key.indices(self.size)))
         rows = np.asarray(key)
@@ -113,6 +114,7 @@ class AxisColumn(ComputedColumn):
 
     @cached_property
     def ends(self) -> tuple[int, int]:
+        """The first row in which the axis' value is least, and the first in which it is largest."""
         if self.rows.kept is not None:
             return super().ends
         chosen = self.rows.chosen[self.axis]
@@ -335,6 +337,7 @@ class SweptRows:
         return np.flatnonzero(seen)
 
     def _index(self, axis: int, inner: np.ndarray) -> np.ndarray:
+        """The place of an axis' value in each of these rows of the product."""
         after, length, chosen = math.prod(self.lengths[axis + 1 :]), self.lengths[axis], self.chosen[axis]
         place = inner if after == 1 else inner // after
         if axis and any(other > 1 for other in self.lengths[:axis]):

@@ -24,8 +24,8 @@ OF_FLIGHT = (("position", "m"), ("attitude", "rad"), ("velocity", "m/s"), ("rate
 
 
 def missing_parameters(experiment: Experiment) -> Iterator[tuple[str, Quantity | None]]:
-    """Paths that the experiment lacks, each with its model's default or the servo's value, None where there is neither.
-    A scaled bed takes no values of its servo."""
+    """Paths of parameters that the experiment lacks, each with its model's default or the servo's value, None where
+    there is neither. A motor bed of another size (`scale`) takes no values of its servo."""
     defaults: dict[str, Quantity] = {}
     scaled = {use.joint for use in experiment.structure.substitutions if use.scaled}
     for path, unit, default, parameter in declared(experiment):
@@ -89,8 +89,8 @@ def timing_defaults(experiment: Experiment) -> dict[str, Quantity]:
 
 
 def related(experiment: Experiment) -> Iterator[tuple[str, tuple[Parameter, ...]]]:
-    """`of_environment`, with the same for guides and links' sensors: parameters that may name parts of the arm, or
-    belong together."""
+    """Parameters of environment models, guides and links' sensors, which may name parts of the arm or belong together:
+    by prefix of their paths, as of `of_environment`."""
     structure = experiment.structure
     yield from of_environment(experiment)
     for sensor in structure.sensors:
@@ -171,6 +171,7 @@ def declared(experiment: Experiment) -> Iterator[Declared]:
 
 
 def _of_payloads(structure: Structure) -> Iterator[Declared]:
+    """Declared parameters of the payloads: mass, inertia, place, and times of grapple and release."""
     for payload in structure.payloads:
         head = f"payloads.{payload.name}"
         yield f"{head}.mass", "kg", None, None
@@ -185,7 +186,7 @@ def _of_payloads(structure: Structure) -> Iterator[Declared]:
 
 
 def _of_base(structure: Structure) -> Iterator[Declared]:
-    """Declared parameters of a base that moves: its initial state, or its courses."""
+    """Declared parameters of a base that moves: its initial state, or the commands that move its components in time."""
     if structure.free:
         for name, unit in OF_FREE_BASE:
             for axis in "xyz":
@@ -195,7 +196,8 @@ def _of_base(structure: Structure) -> Iterator[Declared]:
 
 
 def _of_guides(structure: Structure) -> Iterator[Declared]:
-    """Declared parameters of the guides: their own, those of each joint, and those of their paths' courses."""
+    """Declared parameters of the guides: their own, those of each joint, and those of the commands that move their
+    paths' components in time."""
     kinds = {joint.name: joint for joint in structure.joints}
     for use in structure.guides:
         head, guide = f"guides.{use.name}", models.find("guide", use.model, use.place)
@@ -208,6 +210,7 @@ def _of_guides(structure: Structure) -> Iterator[Declared]:
 
 
 def _of_courses(head: str, courses: Iterable[Course], place: Place | None) -> Iterator[Declared]:
+    """Declared parameters of the commands that move a base's or path's components in time. head: of their paths"""
     for course in courses:
         for parameter in models.find("command", course.model, place).parameters:
             unit = joint_unit(parameter.unit, component(course.component), "position")

@@ -91,6 +91,7 @@ class DrawnColumn(ComputedColumn):
         self._drawn: dict[int, np.ndarray] = {}
 
     def at(self, rows: np.ndarray) -> np.ndarray:
+        """The drawn values of these rows, [row], computed in chunks of points."""
         if not len(rows):
             return np.empty(0)
         if len(rows) > 1 and not (np.diff(rows) >= 0).all():
@@ -145,6 +146,7 @@ class _Nearest:
         self._levels, self.rows = np.zeros(0), np.zeros(0, np.int64)
 
     def add(self, levels: np.ndarray, first: int) -> None:
+        """Take the next levels in (0, 1), of rows from `first` on, and keep the rows of the least."""
         some = np.flatnonzero(levels < self._levels[-1]) if len(self._levels) == self.MOST else np.arange(len(levels))
         if len(some):
             both = np.concatenate([self._levels, levels[some]])
@@ -201,6 +203,7 @@ def _scale(measure: units.Measure) -> np.longdouble:
 
 
 def _truncated(levels: np.ndarray, mean: float, deviation: float, low: float, high: float) -> np.ndarray:
+    """Quantiles of a normal distribution between two ends, at levels in (0, 1)."""
     from scipy.stats import truncnorm
 
     quantiles = truncnorm.ppf(levels, (low - mean) / deviation, (high - mean) / deviation, loc=mean, scale=deviation)

@@ -69,6 +69,8 @@ def write(plan: Plan, path: str | os.PathLike[str], *, computed: bool = False) -
     keepers: dict[str, recipes.ArrayKeeper] = {}
 
     def refer(experiment: Experiment, index: int) -> Any:
+        """The reference to a column of a case table, which is kept beside the plan: a row of a table, or the recipe by
+        which it is computed."""
         name = experiment.name
         if experiment.cases.count <= (LISTED_ROWS if computed else TABLE_ROWS):
             if name not in tables:
@@ -98,6 +100,7 @@ def read(path: str | os.PathLike[str], *, every_case: bool = True) -> Plan:
     arrays: dict[str, tuple[np.ndarray, str]] = {}
 
     def find(reference: dict[str, Any]) -> np.ndarray:
+        """The array of a case table beside the plan. Raises Damaged unless its SHA-256 is the plan's."""
         name = _word(reference, "file")
         if name not in arrays:
             arrays[name] = _read_array(path, name)
@@ -115,6 +118,7 @@ def fetcher(find: recipes.Find) -> Fetch:
     reader = recipes.RecipeReader(find)
 
     def fetch(reference: dict[str, Any]) -> CaseValues:
+        """The column of a case table that a reference of the plan stands for. Raises Damaged."""
         if "row" not in reference:
             try:
                 return reader.column(reference)
@@ -261,6 +265,7 @@ def _beginning(experiment: Experiment) -> Experiment:
 
 
 def _without_values(experiment: Experiment) -> Experiment:
+    """The experiment without the values of its case table."""
     cases = experiment.cases
     coordinates = tuple(replace(c, values=np.empty(0)) for c in cases.coordinates)
     repeats, positions = (None if column is None else np.empty(0) for column in (cases.repeats, cases.positions))
@@ -268,6 +273,7 @@ def _without_values(experiment: Experiment) -> Experiment:
 
 
 def _read_array(plan: Path, name: str) -> tuple[np.ndarray, str]:
+    """An array from a .npy file beside the plan, and the file's SHA-256. Raises Damaged."""
     if Path(name).name != name or not name:
         raise Damaged("", f"it names a case table outside its folder: {name}")
     try:

@@ -8,7 +8,7 @@ from met.plan import Joint
 
 
 def followed(name: str, joints: Mapping[str, Joint]) -> list[str]:
-    """The names of a joint and of all that it follows, by way of others too, each once."""
+    """The names of a joint and of all joints from which its position follows, also by way of others, each once."""
     names = [name]
     for current in names:
         for leader in joints[current].follows if current in joints else ():
@@ -18,10 +18,11 @@ def followed(name: str, joints: Mapping[str, Joint]) -> list[str]:
 
 
 def leaders(name: str, joints: Mapping[str, Joint]) -> list[str]:
-    """The names of the joints that lead a joint, and follow none themselves; its own where it follows none."""
+    """The names of the joints that move by themselves and from which a joint's position follows; its own name where it
+    moves by itself."""
     return [leader for leader in followed(name, joints) if not joints[leader].follows]
 
 
 def follows_itself(name: str, joints: Mapping[str, Joint]) -> bool:
-    """True for a joint that follows itself by way of others."""
+    """True for a joint whose position would follow from its own, by way of others."""
     return any(name in joints[other].follows for other in followed(name, joints) if other in joints)

@@ -70,6 +70,7 @@ def extremes(experiment: Experiment) -> dict[str, tuple[LimitUse, ...]]:
 
 
 def _is_one(quantity: Quantity | None) -> bool:
+    """True if a parameter has a value that limits anything."""
     if quantity is None:
         return False
     value = quantity.value
@@ -85,6 +86,7 @@ def _of_joints(structure: Structure) -> Iterator[LimitUse]:
 
 
 def _of_servos(structure: Structure) -> Iterator[LimitUse]:
+    """The limits of servos, each with the channels that it limits."""
     for use in structure.servos:
         parts, path = servo_parts(use), f"{use.joint}.servo"
         declared: tuple[Memory | Signal, ...] = (*parts.outputs, *parts.signals)
@@ -95,6 +97,7 @@ def _of_servos(structure: Structure) -> Iterator[LimitUse]:
 
 
 def _of_commands(structure: Structure) -> Iterator[LimitUse]:
+    """The limits that commands of servos may reach, such as a table's ends."""
     for use in structure.servos:
         if use.command is not None and not use.command.guide:
             for limit in models.find("command", use.command.model, use.place).limits:
@@ -102,6 +105,7 @@ def _of_commands(structure: Structure) -> Iterator[LimitUse]:
 
 
 def _of_environment(structure: Structure, parameters: Mapping[str, Quantity]) -> Iterator[LimitUse]:
+    """The limits that models of the environment may reach, each with its joint."""
     for use in structure.environment:
         model, path = models.find("environment", use.model, use.place), f"environment.{use.name}"
         named = next((parameter.name for parameter in model.parameters if parameter.names == "joint"), "")

@@ -30,6 +30,8 @@ def input_signals(structure: Structure) -> tuple[InputSignal, ...]:
 
 
 def _of_servo(use: ServoUse) -> list[InputSignal]:
+    """The signals at which a linear answer may put something in: a servo's command, and the outputs of its law if that
+    ticks."""
     parts = servo_parts(use)
     if models.find("servo", use.model, use.place).control is None or parts.continuous:
         return []

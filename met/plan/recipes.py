@@ -34,6 +34,7 @@ class ArrayKeeper:
         self._put, self._stored = put, list[tuple[np.ndarray, Any]]()
 
     def keep(self, array: np.ndarray) -> Any:
+        """The reference to an array, which is stored at the first call."""
         for known, where in self._stored:
             if known is array:
                 return where
@@ -113,6 +114,7 @@ class RecipeReader:
         return self._drawn(data)
 
     def _drawn(self, data: Mapping[str, Any]) -> ComputedColumn:
+        """A column of values drawn from a distribution, from its JSON. Raises ValueError."""
         arguments, name = tuple(map(_number, data["arguments"])), _word(data["distribution"])
         if name not in drawing.QUANTILES or len(arguments) != drawing.ARGUMENTS[name]:
             raise ValueError("there is no such distribution")
@@ -123,6 +125,7 @@ class RecipeReader:
         return drawing.DrawnColumn(count, seed, _word(data["path"]), sample, name, arguments, _word(data["unit"]))
 
     def _values(self, data: Any) -> CaseValues:
+        """The values of an axis from JSON: numbers, an array kept elsewhere, or another column. Raises ValueError."""
         if isinstance(data, Mapping):
             if data.keys() & {"axis", "first", "positions", "shifted", "seed"}:
                 return self.column(data)
@@ -140,6 +143,7 @@ class RecipeReader:
         return self._rows_read[known]
 
     def _new_rows(self, data: Mapping[str, Any]) -> SweptRows:
+        """The rows of the product of a sweep's axes that its table has, from JSON. Raises ValueError."""
         sizes = tuple(_whole(size, least=1) for size in data["sizes"])
         if len(sizes) > MOST_AXES or math.prod(sizes) > MOST_ROWS or len(data["chosen"]) != len(sizes):
             raise ValueError("a table has more rows than any")
@@ -155,6 +159,8 @@ class RecipeReader:
         return rows.only(self._bits(data["kept"], rows.product, rows.product))
 
     def _bits(self, data: Any, most: int, count: int) -> RowBits:
+        """The rows of a table that count, from packed bits. Raises ValueError where they are not as many as its
+        rows."""
         if not isinstance(data, Mapping):
             raise ValueError("bits of a table are kept elsewhere")
         packed = self._find(data)

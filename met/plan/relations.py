@@ -67,6 +67,8 @@ def tests(
 def _check_list(
     experiment: Experiment, prefix: str, parameter: Parameter, numbers: tuple[Any, ...], where: str
 ) -> None:
+    """Check that a list parameter has as many numbers as the other list it goes with, and rises where it must. Raises
+    Damaged."""
     if parameter.as_many_as and (numbers or parameter.default is None):
         other = experiment.parameters.get(f"{prefix}.{parameter.as_many_as}")
         if other is not None and isinstance(other.value, tuple) and len(other.value) != len(numbers):
@@ -123,7 +125,8 @@ def check_guides(structure: Structure, where: str) -> None:
 
 
 def check_courses(use: Base | GuideUse, components: Sequence[str], path: str) -> None:
-    """Check that courses are those of components, in their order, and that there are their models."""
+    """Check that the commands that move a path or a base in time are of its components, in their order, and of models
+    that there are. Raises Damaged."""
     known = list(components)
     for index, course in enumerate(use.courses):
         if course.component not in known:
@@ -181,6 +184,8 @@ def rest_tests(experiment: Experiment) -> list[Test]:
 
 
 def _test(experiment: Experiment, use: ServoUse) -> Test:
+    """The test that a servo which cannot move a joint at the start begins at rest: the tested path, the paths it reads,
+    a function of their values [case, path], and the message."""
     servo, rate = models.find("servo", use.model, use.place), f"initial.{use.joint}.qd"
     head = f"{use.joint}.servo."
     numbers = {

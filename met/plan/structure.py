@@ -37,6 +37,7 @@ def check(structure: Structure, where: str) -> None:
 
 
 def check_name(text: str, where: str, before: Collection[str] = ()) -> None:
+    """Check that a text is a name, and not among those before. Raises Damaged."""
     if not NAME.fullmatch(text):
         raise Damaged(where, f"{text!r} is no name: letters, digits and _")
     if text in before:
@@ -110,8 +111,8 @@ def _check_followers(structure: Structure, where: str) -> None:
 
 
 def _check_base(structure: Structure, where: str) -> None:
-    """Check that a moving base is a link, that its courses are those of components, and that a turning one keeps the
-    velocity products."""
+    """Check that a moving base is a link, that what moves it in time is of its components, and that the base keeps its
+    velocity products where it turns. Raises Damaged."""
     base, links = structure.base, [link.name for link in structure.links]
     if base is None:
         return
@@ -137,6 +138,7 @@ def _check_payloads(structure: Structure, where: str) -> None:
 
 
 def _check_schedule(structure: Structure, where: str) -> None:
+    """Check that the base rate is above 0, and all divisors and tick counts are whole and in range. Raises Damaged."""
     schedule, path = structure.schedule, f"{where}.schedule"
     if not 0.0 < schedule.base_hz < math.inf:
         raise Damaged(f"{path}.base_hz", "it should be above 0, and finite")
@@ -249,7 +251,8 @@ def _moves(kinds: Mapping[str, str], joint: str, path: str) -> None:
 
 
 def _check_substitutions(structure: Structure, where: str) -> None:
-    """Check that joints on beds exist, once each, and have one law and servos that tick together."""
+    """Check that joints whose motors are on beds exist, once each, and have one law and servos that tick at the same
+    instants. Raises Damaged."""
     kinds = {joint.name: joint.kind for joint in structure.joints}
     servos = {use.joint: use for use in structure.servos}
     on_beds: set[str] = set()
@@ -283,6 +286,8 @@ def _check_substitutions(structure: Structure, where: str) -> None:
 
 
 def _check_record(structure: Structure, where: str) -> None:
+    """Check that each recorded signal is there once, and has channels, joints, components and units that go together.
+    Raises Damaged."""
     known = channels(structure) if structure.record else {}
     names: list[str] = []
     for index, recorded in enumerate(structure.record):

@@ -31,6 +31,8 @@ def advance_with(integrator: Integrator, settled: Sequence[Slope], h: Real, y: M
     questions: list[Question] = []
 
     def slope(c: Real, state: Motion) -> Slope:
+        """The slope at a stage, as asked by the integrator: the known answer, or _Unanswered raised where there is none
+        yet. c: the stage's time as a share of the step"""
         if not isinstance(c, (float, int, Scalar)):
             raise TypeError(f"slope(c, y) was given a {type(c).__name__} for the share of the step")
         wrong = _wrong(state, y)

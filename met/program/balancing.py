@@ -152,6 +152,7 @@ def _loads(system: System, tape: Tape, y: Motion, begun: Mapping[str, Mapping[st
     held = [NamedValues("", {} if a is None else begun[a.use.joint]) for a in system.actuators]
 
     def moved(modes: Mapping[str, Real]) -> Derivative:
+        """The derivative at the start, with these modes of friction."""
         return derivative(
             system,
             tape.read,
@@ -191,6 +192,7 @@ def _demand(
     torque: Real,
     begun: Mapping[str, Mapping[str, Real]],
 ) -> Demand:
+    """What a servo must give to hold its joint at the start, with the servo's inputs and parameters there."""
     starts, q, qd = begun[actuator.use.joint], y.q[actuator.index], y.qd[actuator.index]
     stays = {"position": Setpoint("position", q, qd), "rate": Setpoint("rate", qd, 0.0)}
     setpoint = stays.get(actuator.command_kind, Setpoint(actuator.command_kind, 0.0, 0.0))

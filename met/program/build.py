@@ -211,6 +211,7 @@ class Builder:
             tape.write(cells.SEEN(actuator.use.joint, quantity), sensing.true_value(seen, quantity))
 
     def end(self, tape: Tape) -> None:
+        """The phase at a run's end: excesses over limits, metrics and read-back parameters become outputs."""
         self.limits.keep_excess(tape)
         for name in (*OUTPUTS, *self.watched):
             tape.output(name, tape.read(name))
@@ -228,6 +229,8 @@ class Builder:
         return lambda tape: link_sensors.tick(self.system, tape, divisor)
 
     def _guides(self, divisor: int) -> Body:
+        """The phase that ticks the guides of this divisor."""
+
         def body(tape: Tape) -> None:
             for use in guiding.ticking(self.system):
                 if use.divisor == divisor:
@@ -236,6 +239,8 @@ class Builder:
         return body
 
     def _servos(self, divisor: int) -> Body:
+        """The phase that ticks the servos' computers of this divisor."""
+
         def body(tape: Tape) -> None:
             for actuator in self.system.working:
                 if actuator.ticks and actuator.use.divisor == divisor:
@@ -337,6 +342,7 @@ class Builder:
         plausible.watch(tape, names, numbers)
 
     def _metric(self, tape: Tape, name: str) -> tuple[NamedValues, NamedValues]:
+        """The parameters and the memory of a metric."""
         metric = next(model for known, model, _ in self.system.metrics if known == name)
         owner = f"metric `{name}` (model {metric.name})"
         path = f"metrics.{name.removesuffix(FURTHEST)}"
@@ -349,6 +355,7 @@ class Builder:
         period = divisor / self.schedule.base_hz
 
         def body(tape: Tape) -> None:
+            """Update the metrics that are evaluated at this rate, each from its channel."""
             is_new: dict[str, Truth] = {}
             dt = where(tape.tick == 0.0, 0.0, period)
             for name, metric, channel in self.system.metrics:
@@ -370,6 +377,7 @@ class Builder:
         """Signals that are computed from channels, as these were last sampled."""
 
         def body(tape: Tape) -> None:
+            """Compute the signals of expressions that are evaluated at this rate."""
             for expression in self.system.structure.expressions:
                 if self.system.channels[expression.name].divisor == divisor:
                     values = {
@@ -384,6 +392,8 @@ class Builder:
         return body
 
     def _observe(self, held: list[Channel]) -> Body:
+        """The phase that computes derived channels at every instant, and keeps them in cells."""
+
         def body(tape: Tape) -> None:
             by_path = observe.values(tape, self.step.observed(tape), held, observe.INSTANT)
             for path, value in by_path.items():
@@ -397,6 +407,7 @@ class Builder:
         seen = [channel for channel in held if channel.path in columns]
 
         def body(tape: Tape) -> None:
+            """Record a row: derived channels that only it needs are computed now, others read from their cells."""
             fresh = observe.held(tape, seen)
             if at_rows:
                 fresh |= observe.values(tape, self.step.observed(tape), at_rows, observe.ROW)

@@ -147,6 +147,7 @@ class NamedValues:
         self._numbers = dict(numbers)
 
     def __getattr__(self, name: str) -> Any:
+        """The number of a name that the model has declared. Raises Problem E211 for another."""
         try:
             return self._numbers[name]
         except KeyError:

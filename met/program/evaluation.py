@@ -293,7 +293,7 @@ def level_of(system: System, joint: int, drive: Drive | None, loads: _Loads) -> 
 
 
 def group_level(system: System, ratios: Ratios, leader: int, drives: Sequence[Drive | None], loads: _Loads) -> Real:
-    """The level of dry friction at a joint that follows none, with that of the joints that follow it alone."""
+    """The level of dry friction at a joint that moves by itself, with that of the joints that follow it alone."""
     total = level_of(system, leader, drives[leader], loads)
     for i, ratio in _rubbing(system, ratios, leader, drives, loads).items():
         total = total + absolute(ratio) * level_of(system, i, drives[i], loads)
@@ -327,7 +327,7 @@ def _servo_torques(
 def _rubbing(
     system: System, ratios: Ratios, leader: int, drives: Sequence[Drive | None], loads: _Loads
 ) -> dict[int, Real]:
-    """The joints with dry friction that follow a joint alone, by number, with their ratios."""
+    """The joints with dry friction whose motion follows from this joint's alone, by number, with their ratios."""
     return {
         i: row[leader]
         for i, row in enumerate(ratios)
@@ -336,7 +336,7 @@ def _rubbing(
 
 
 def _share(level: Real, total: Real) -> Real:
-    """level over total, 0 where there is none."""
+    """The share of a level in the total, 0 where the total is."""
     has_friction = total > 0.0
     return where(has_friction, level / where(has_friction, total, 1.0), 0.0)
 
@@ -366,8 +366,8 @@ def followers_level(
     time: Real,
     begin: Real,
 ) -> Real:
-    """The dry friction of joints that follow one joint, as that one feels it, N m (N). on_joints: that of brakes, by
-    joint."""
+    """The dry friction of joints that follow one joint, as that joint feels it through their ratios, N m (N).
+    on_joints: that of brakes, by joint."""
     ratios = system.ratios(read, y.q)
     total: Real = 0.0
     for i in followers:

@@ -43,7 +43,8 @@ class Sticking:
 
 
 def sticking(system: System) -> tuple[Sticking, ...]:
-    """Joints first, then states; none of a joint whose motor is on a bed: its friction is the bed's."""
+    """What may stick by dry friction: joints first, then states. A joint whose motor is on a bed is not among them,
+    since its friction is the bed's own."""
     on_bed = [actuator.index for actuator, _, _ in system.mounted]
     free = [actuator for actuator in system.working if actuator.index not in on_bed]
     own = [

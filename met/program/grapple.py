@@ -159,6 +159,7 @@ class Grapple:
         self._keep_followers(tape)
 
     def _drive(self, tape: Tape, actuator: Actuator | None, y: Motion) -> Drive | None:
+        """The drive of a servo at the instant of a grapple; None for a joint without one."""
         if actuator is None:
             return None
         held = self._held(tape, actuator)

@@ -105,6 +105,7 @@ class Observed:
         raise KeyError(f"{joint}.{'.'.join(parts)}")
 
     def _of_link(self, channel: Channel, parts: list[str]) -> Real:
+        """A channel of a link, by the words of its path: pose, velocity, Jacobian, or bending of a boom."""
         link, kind, *rest = parts
         if kind == "jacobian":
             angular, linear = self._jacobian(link)[self.joints.index(channel.joint)]
@@ -143,6 +144,8 @@ class Observed:
         )
 
     def _of_payload(self, parts: list[str]) -> Real:
+        """A channel of a payload, by the words of its path: whether it is carried, the distance from its place, or its
+        motion."""
         name, kind, *rest = parts
         payload, motion = next(other for other in self.system.structure.payloads if other.name == name), self.seen[name]
         if kind == "carried":
@@ -153,6 +156,7 @@ class Observed:
         return _of_frame(motion, kind, rest[0])
 
     def _of_environment(self, name: str, signal: str, axis: str = "") -> Real:
+        """A signal that a model of the environment shows, at this instant."""
         model = dict(self.system.environment)[name]
         assert model.show is not None
         owner, p = environment_values(self.system, name, model, self.read)
@@ -164,6 +168,7 @@ class Observed:
         return signals[signal][XYZ.index(axis)] if axis else signals[signal]
 
     def _of_arm(self, parts: list[str]) -> Real:
+        """A channel of the whole arm, by the words of its path: energy, momentum, or the margin to joint limits."""
         match parts:
             case ["energy", "kinetic"]:
                 return self.energy.kinetic + self.derivative.stored[0]
@@ -188,6 +193,7 @@ class Observed:
         return reduce(minimum, shares)
 
     def _jacobian(self, link: str) -> Sequence[tuple[Vector, Vector]]:
+        """Columns of a link's Jacobian in the world, for unit rates of the joints that lead."""
         if link not in self._jacobians:
             columns = jacobian(self.tree, self.q, link, base=self.base.pose)
             self._jacobians[link] = at_leaders(self.system.ratios(self.read, self.q), columns)
@@ -229,7 +235,8 @@ class Observed:
 
     @cached_property
     def energy(self) -> Energy:
-        """Energy and momentum of the arm, and of each payload that flies for a time, carried or not."""
+        """Energy and momentum of the arm, and of each payload that is a free body for a part of the run, whether a link
+        carries it now or not."""
         derivative, base = self.derivative, self.base
         total = energy(
             self.tree,

@@ -50,6 +50,7 @@ class StepPhases:
     """The phases of one step of a system. Every method that takes a tape is the body of a phase."""
 
     def __init__(self, system: System, *, wire: bool = False, late: int = 0) -> None:
+        """wire: whether real motor beds are at the wire; late: ticks of their delay that pass on it"""
         self.system = system
         self.beds = Substituted(system, self.loads, wire=wire, late=late)
         self.schedule = system.structure.schedule
@@ -86,7 +87,7 @@ class StepPhases:
         return (Every(self.schedule.dynamics, (RunPhase(Phase("follow", self.keep_followers)),)),)
 
     def keep_followers(self, tape: Tape) -> None:
-        """Write positions and rates of joints that follow others."""
+        """Write positions and rates of the joints whose motion follows from others' (by ratios or a loop)."""
         if not self._followers:
             return
         y = self.state(tape)
@@ -189,6 +190,8 @@ class StepPhases:
         self._decided(tape, single=True)
 
     def _decided(self, tape: Tape, *, single: bool) -> None:
+        """Decide the friction modes of all that may stick from the present accelerations. single: at most one mode
+        changes."""
         active, y = tape.read_mask("undecided"), self.state(tape)
         changed: Truth = False
         for part, level in zip(self.sticking, self._levels(tape), strict=True):
@@ -360,6 +363,7 @@ class StepPhases:
         """The body of the piece that ends at a question, after `settled` answered ones."""
 
         def body(tape: Tape) -> None:
+            """Run the integrator up to its next question, and store the state that it asks about."""
             fraction = tape.read("fraction") if again else 0.0
             question = self._integrate(tape, settled, fraction)
             if not isinstance(question, Question):
@@ -373,6 +377,8 @@ class StepPhases:
         """The body of the last piece: the state at the end, and whether a rate came to zero in between."""
 
         def body(tape: Tape) -> None:
+            """Finish the step: store the new state, and where a sliding rate has crossed zero also the one at the
+            step's start, so that the step can be split there."""
             active: Truth = tape.read_mask("again") if again else True
             y = self.state(tape)
             y_new = self._integrate(tape, settled, tape.read("fraction") if again else 0.0)

@@ -157,7 +157,8 @@ class System:
         return {joint.name: i for i, joint in enumerate(self.joints)}
 
     def led(self, joint: Joint, read: ReadCell, q: Sequence[Real]) -> Led:
-        """A joint that follows by a loop, at positions q of all joints, of which it reads that of the loop's leader."""
+        """Position and ratio of a joint in a loop, with its derivative, as they follow from the position in q of the
+        joint that leads the loop."""
         loop = joint.loop
         assert loop is not None
         number = lambda path: self.value(path, read) if path in self._parameters else 0.0  # noqa: E731  # a pivot
@@ -165,16 +166,17 @@ class System:
         return close(corners, q[self.numbers[loop.leader]], left=loop.branch == "left")[0][joint.name]
 
     def _ratios(self, joint: Joint, read: ReadCell, q: Sequence[Real]) -> dict[int, Real]:
-        """The ratios of a joint to those that it follows itself, by their numbers."""
+        """The ratios of a joint's rate to those of the joints that it follows directly, by their numbers."""
         if joint.loop is not None:
             return {self.numbers[joint.loop.leader]: self.led(joint, read, q).ratio}
         return {self.numbers[name]: self.value(path, read) for name, path in joint.ratio_paths.items()}
 
     def ratios(self, read: ReadCell, q: Sequence[Real]) -> Ratios:
-        """The ratios of the joints at positions q to those that lead them; followers of followers to the first that
-        lead."""
+        """The ratio of each joint's rate to those of the joints that lead it, at positions q; through followers of
+        followers, to those that move by themselves."""
 
         def row(i: int) -> dict[int, Real]:
+            """The ratio of joint i's rate to that of each joint that leads it."""
             if not self.joints[i].follows:
                 return {i: 1.0}
             by_leader: dict[int, Real] = {}
@@ -188,10 +190,11 @@ class System:
         return tuple(rows.get(i, {i: 1.0} if i in leaders else {}) for i in range(len(self.joints)))
 
     def bends(self, read: ReadCell, y: Motion) -> tuple[Real, ...]:
-        """The accelerations of joints that follow while those that lead have none, as loops have it, rad/s^2. Not a
-        number of a loop that would be flat within two steps: a longer one jumps across, onto the same branch."""
+        """The accelerations of joints in loops while the joints that lead them have none, rad/s^2. Not-a-number for a
+        loop that would be flat within two steps, since a longer step jumps across onto the same branch."""
 
         def bend(i: int) -> Real:
+            """The acceleration of joint i while the joints that lead it have none."""
             joint = self.joints[i]
             own: Real = 0.0
             if joint.loop is not None:
@@ -209,6 +212,7 @@ class System:
         q, qd = list(y.q), list(y.qd)
 
         def place(i: int) -> int:
+            """Set position and rate of joint i from those that lead it, and return i."""
             joint = self.joints[i]
             if joint.loop is not None:
                 leader = place(self.numbers[joint.loop.leader])
@@ -258,6 +262,8 @@ class System:
 
     @cached_property
     def metrics(self) -> tuple[tuple[str, Metric, Channel], ...]:
+        """The metrics by name, each with its model and the channel that it watches; those with furthest values
+        behind."""
         uses = [(use, models.find("metric", use.model)) for use in self.structure.metrics]
         own = [
             (use.name, (metric.between or metric) if self.between_samples else metric, self.channels[use.of])
@@ -299,7 +305,8 @@ class System:
 
     @cached_property
     def mounted(self) -> tuple[tuple[Actuator, BedModel, Law], ...]:
-        """The actuators whose motors are on a bed, in the order of joints, with their beds and laws."""
+        """The actuators of the joints whose motors are on a bed (a real or emulated shaft with a load motor), each with
+        its bed's and its law's model, in the order of joints."""
         uses = {use.joint: use for use in self.structure.substitutions}
         return tuple(
             (a, models.find("bed", uses[a.use.joint].bed), models.find("law", uses[a.use.joint].law))
@@ -314,7 +321,7 @@ class System:
 
     @cached_property
     def courses(self) -> Formulas:
-        """The motion of a prescribed base, as formulas of time (`met.program.courses`)."""
+        """The motion of a prescribed base as recorded formulas of time (`met.program.courses`)."""
         return recorded(self.experiment)
 
     @cached_property
@@ -385,6 +392,7 @@ class System:
 
     @cached_property
     def _fixed_tree(self) -> Tree | None:
+        """The arm's tree where no case varies anything of it; else None."""
         joints = {joint.name for joint in self.structure.joints}
         for path in self.varying:
             head, *rest = path.split(".")
@@ -393,6 +401,7 @@ class System:
         return self._tree(lambda _: 0.0)
 
     def _tree(self, read: ReadCell) -> Tree:
+        """The arm's tree of links and fixed payloads, with the numbers that `read` gives for parameters that vary."""
         numbers = {link.name: index for index, link in enumerate(self._link_order())}
         joints = {joint.child: joint for joint in self.structure.joints}
         bodies = []
@@ -437,6 +446,9 @@ class System:
         return [links[joint.child] for joint in self.structure.joints]
 
     def _actuator(self, index: int, use: ServoUse) -> Actuator:
+        """The servo of a joint with its models looked up, and what it does to the joint by its nature: dry friction, a
+        given acceleration. Raises Problem E219 where a given acceleration meets friction, or a joint that follows
+        another."""
         servo = models.find("servo", use.model, use.place)
         has_course = use.command is not None and not use.command.guide
         profile = models.find("command", use.command.model, use.place) if use.command and has_course else None

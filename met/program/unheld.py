@@ -57,8 +57,8 @@ class Unheld:
 
 
 def unheld(experiment: Experiment, values: np.ndarray, *, commanded: bool = False) -> list[tuple[Unheld, ...]]:
-    """For each case of these inputs, [case, input], the joints that are to begin balanced and cannot be held, in the
-    arm's order. commanded: as for `holding.holds`."""
+    """For each case of these inputs, [case, input], the joints that are to begin balanced and that their servos cannot
+    hold, in the arm's order. commanded: as for `holding.holds`."""
     by_case: list[tuple[Unheld, ...]] = [()] * len(values)
     if not experiment.structure.balanced or not len(values):
         return by_case
@@ -161,6 +161,7 @@ class _Judged:
         return self._without(*self.limits)
 
     def _without(self, *names: str) -> np.ndarray:
+        """True of each case in which the servo could hold its joint if these limits of it were infinite."""
         actuator = self.demand.actuator
         numbers = parameters(
             actuator.owner,

@@ -74,17 +74,19 @@ class Answer:
 
     @property
     def confirmed(self) -> bool:
-        """True if a candidate was tried against all plants."""
+        """True if the candidate was run on all plants (the cases of the sweep that a tuning judges candidates on)."""
         return self.tried == self.all
 
     @property
     def serves(self) -> bool:
-        """True if a candidate meets all requirements with all plants; for a search, if even the worst case does."""
+        """True if a tuning's candidate meets all requirements on all plants (the cases that it is judged on) and its
+        least margin; for a search, if even the worst case meets them."""
         return self.stands and (self.stability is None or self.search.advises(self.stability))
 
     @property
     def stands(self) -> bool:
-        """True if a candidate meets all requirements with all plants, whatever its stability."""
+        """True if the candidate meets all requirements on all plants (the cases that it is judged on), whatever its
+        stability."""
         return self.confirmed and not self.failed and not self.missed and self.value == self.value
 
 
@@ -149,8 +151,9 @@ def answer(
 
 
 def designs_that_stand(search: Search, table: np.ndarray, worth: np.ndarray) -> list[np.ndarray]:
-    """The candidates of a tuning that meet all requirements with all plants, the best by the goal first: the places of
-    each one's cases, its worst first. table: as of `answer`; worth: of the cases, as the tuning took it"""
+    """The candidates of a tuning that meet all requirements on all plants (the cases that it judges them on), the best
+    by the goal first: of each the places of its cases in `table`, its worst first. table: as of `answer`; worth: of the
+    cases, as the tuning took it."""
     _, first, of_case = np.unique(table[:, : len(search.parameters)], axis=0, return_index=True, return_inverse=True)
     of_case = of_case.ravel()
     worst = np.full(len(first), -np.inf)
@@ -169,7 +172,7 @@ def _nearest_miss(
     metrics: Mapping[str, np.ndarray],
     requirements: Sequence[NamedLimit],
 ) -> NearestMiss | None:
-    """The candidate nearest to that of a case among those of which some case fails, or misses a requirement; None where
+    """The candidate nearest to that of a case among those with a case that fails or misses a requirement; None where
     there is none."""
     met = np.array([_met(requirement, metrics[requirement.metric], done) for requirement in requirements]).reshape(
         -1, len(done)
@@ -184,7 +187,7 @@ def _nearest_miss(
 
 def nearest(search: Search, table: np.ndarray, case: int, among: np.ndarray) -> tuple[int, float]:
     """The first case, among these places of a table, whose candidate is nearest to that of a case; and its distance, as
-    a share of the range of the parameter that is farthest."""
+    a share of the range of the parameter that is farthest apart."""
     shares = np.stack(
         [shares_of_range(parameter, table[:, column]) for column, parameter in enumerate(search.parameters)]
     )
@@ -214,6 +217,7 @@ def _room(limit: MetricLimit, values: np.ndarray) -> float:
 
 
 def _ends(search: Search, case: np.ndarray) -> Iterator[tuple[str, str]]:
+    """The chosen parameters that are at an end of their range in this case, with the end."""
     for parameter, value in zip(search.parameters, case, strict=False):
         share = float(shares_of_range(parameter, value))
         if not NEAR < share < 1.0 - NEAR:

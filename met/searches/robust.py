@@ -29,7 +29,8 @@ class HardestCase:
         self._new: list[bytes] = []
 
     def ask(self) -> np.ndarray:
-        """Coordinates of the next generation's cases (`SearchMethod.ask`)."""
+        """Coordinates of the next generation's cases, [case, coordinate], at which the optimiser looks for the worst
+        (`SearchMethod.ask`)."""
         left = self._search.at_most - len(self._known)
         while left > 0:
             cases = self._search.values(self._optimiser.ask())
@@ -114,7 +115,8 @@ class RobustTuning:
         self._begin_turn(None)
 
     def ask(self) -> np.ndarray:
-        """Coordinates of the next generation's cases (`SearchMethod.ask`)."""
+        """Coordinates of the next generation's cases, [case, coordinate]: each candidate with the plants (cases of a
+        sweep to judge it on) that it is run on (`SearchMethod.ask`)."""
         while not self._confirmed:
             self._wanted = self._next()
             if self._wanted:
@@ -159,7 +161,8 @@ class RobustTuning:
         self._begin_turn(1.0 - self._points[best] if self._fruitless else None)
 
     def _begin_turn(self, start: np.ndarray | None) -> None:
-        """Begin a turn, around a good candidate or in the middle, if there are enough cases; else begin afresh."""
+        """Begin a turn, which tunes on the active plants (cases to judge on) around a good candidate or in the middle,
+        if enough cases are left; else begin afresh."""
         room = self._left - self._reserve
         if room < SHORTEST * len(self._active):
             self._begin_afresh()
@@ -181,11 +184,12 @@ class RobustTuning:
 
     @property
     def _reserve(self) -> int:
-        """Number of cases that it takes to try the best of a turn against all plants."""
+        """The number of cases that it takes to run the best candidate of a turn on the plants that it was not tuned
+        on."""
         return len(self._plants) - len(self._active)
 
     def _next(self) -> list[tuple[Candidate, int]]:
-        """The next candidates with their plants, without those that were tried before."""
+        """The next candidates, each with the plants (cases to judge it on) that it has not been run on yet."""
         if not self._confirming and (self.steps is None or not self.steps.going):
             before = len(self._batch)
             wanted = self._of_points(around(self._middle, self._tuner.ask()))
@@ -206,7 +210,8 @@ class RobustTuning:
         return [] if self._confirmed else wanted
 
     def _of_points(self, points: np.ndarray) -> list[tuple[Candidate, int]]:
-        """Points of the cube as candidates of the next generation: the new ones, with the active plants."""
+        """The candidates at these points of the unit cube that are new, each to be run on the active plants (those that
+        are tuned against in this turn)."""
         self._batch = [value.tobytes() for value in self._search.values(points)]
         for candidate, point in zip(self._batch, points, strict=True):
             self._points.setdefault(candidate, point)
@@ -215,7 +220,7 @@ class RobustTuning:
         return self._unknown(self._batch, self._active)
 
     def _has_room(self, wanted: list[tuple[Candidate, int]]) -> bool:
-        """True if there are candidates, and the new ones leave enough cases to try the best against all plants."""
+        """True if there are candidates, and running the new ones leaves enough cases to run the best on all plants."""
         return bool(self._batch) and len(wanted) <= self._left - self._reserve
 
     def _step_from(self, candidate: Candidate) -> None:
@@ -234,7 +239,8 @@ class RobustTuning:
         return [(candidate, plant) for candidate in once for plant in plants if plant not in self._known[candidate]]
 
     def _go_on(self) -> None:
-        """Pass on the known worths of a generation; or judge the best of a turn, which was tried against all plants."""
+        """Hand the results of a generation to the optimiser; after a turn, when the best was run on all plants, add the
+        plant on which it is worst to the active ones and begin the next turn."""
         if not self._confirming:
             if self.steps is not None and self.steps.going:
                 candidate = self._batch[0]
@@ -261,13 +267,13 @@ class RobustTuning:
         self._begin_turn(self._points[best])
 
     def _best(self) -> Candidate:
-        """The candidate with the best worth against the active plants, among those tried against all of them and asked
-        for since the beginning."""
+        """The candidate with the best worth on the active plants (those that are tuned against now), among those that
+        were run on all of them since the last fresh beginning."""
         tried = [candidate for candidate in self._since_beginning if self._known[candidate].keys() >= set(self._active)]
         return min(tried, key=self._worst)
 
     def _worst(self, candidate: Candidate) -> float:
-        """The worth of a candidate against the active plants."""
+        """The worth of a candidate on the active plant (one that is tuned against now) on which it is worst."""
         return max(self._known[candidate][plant] for plant in self._active)
 
 

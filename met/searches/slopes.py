@@ -53,7 +53,7 @@ class SlopeSource(Protocol):
 
 
 def worth_of(search: Search, requirements: Sequence[MetricLimit], case_slopes: CaseSlopes) -> float:
-    """The worth of the worst of these cases, by what its metrics are between samples."""
+    """The worth of a candidate as that of the worst of these cases, by what its metrics are between samples."""
     goal = case_slopes.values[search.metric]
     return float(
         served(goal, search.largest, case_slopes.done, requirements, case_slopes.values, search.margin).max(
@@ -153,11 +153,12 @@ class SlopeSteps:
         return points
 
     def end(self) -> None:
-        """End the descent."""
+        """End the descent along slopes."""
         self._descent = None
 
     def tell(self, candidate: np.ndarray, plants: Sequence[tuple[float, ...]], known: float) -> None:
-        """The candidate that was asked for last has been run with these plants. known: its worth"""
+        """Take the result of the candidate that `ask` gave last, and make the descent's next step. plants: the cases of
+        a tuning that it was run on; known: its worth."""
         assert self._descent is not None
         away = self._steered_away(known, self._descent.worth)
         self._descent.tell(*((math.inf, None) if away else self._local(candidate, plants)))
@@ -168,7 +169,8 @@ class SlopeSteps:
         return self._search.steers and known >= MET > worth
 
     def _local(self, candidate: np.ndarray, plants: Sequence[tuple[float, ...]]) -> tuple[float, LocalModel | None]:
-        """The worth of a candidate, by its metrics between samples, and a local model of the function to minimise."""
+        """The worth of a candidate by its metrics between samples, and a local model of the function that the descent
+        minimises."""
         slopes = self._source.slopes(np.array([[*candidate, *plant] for plant in plants]))
         if isinstance(slopes, CaseSlopes):
             model = local_model(self._search, self._source.requirements, slopes, candidate)

@@ -77,7 +77,8 @@ def served(
     metrics: Mapping[str, np.ndarray],
     margin: float,
 ) -> np.ndarray:
-    """The worth of cases to a tuning, [case]. metrics: their values by name, SI."""
+    """The worth of cases to a tuning, [case], the least the best: infinite for a failed case, else by metrics without a
+    value, by missed requirements, by the goal. metrics: their values by name, SI."""
     least = -goal if largest else goal
     shape = (len(limits), len(goal))
     far = np.array([missed(limit, metrics[limit.metric]) for limit in limits]).reshape(shape)

@@ -145,7 +145,7 @@ def swings(p: Any, kind: str) -> Mapping[str, tuple[Real, Real]]:
 
 
 def full(p: Any) -> Mapping[str, Real]:
-    """The largest current."""
+    """The output of a servo that gives all it can: its largest current, A."""
     return {"current_cmd": p.i_max}
 
 

@@ -30,7 +30,7 @@ def control(p: Any, held: Any, seen: Seen) -> Control:
 
 
 def drive(p: Any, held: Any, states: Any, joint: JointMotion) -> Drive:
-    """The acceleration that follows the command."""
+    """The acceleration with which a joint follows its command: that of a low-pass of the parameter `bandwidth`."""
     setpoint = held.value + held.slope * (joint.time - held.since)
     w = p.bandwidth
     if joint.command == "rate":

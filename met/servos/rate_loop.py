@@ -85,7 +85,7 @@ def fastest(p: Any) -> Real:
 
 
 def full(p: Any) -> dict[str, Real]:
-    """The largest voltage."""
+    """The output of a servo that gives all it can: its largest voltage, V."""
     return {"voltage": p.v_max}
 
 

@@ -65,7 +65,7 @@ def fastest(p: Any) -> Real:
 
 
 def motor(p: Any) -> Motor:
-    """The motor, which a bed may replace."""
+    """The motor's parameters, in the form that a motor bed needs in its place."""
     return Motor(
         ratio=p.ratio, kt=p.kt, resistance=p.resistance, tau_max=p.tau_max, inertia=p.j_m, f_c=p.f_c, f_v=p.f_v
     )

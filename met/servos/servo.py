@@ -248,6 +248,7 @@ def parts(servo: Servo, words: Mapping[str, str], *, continuous: bool = False) -
 
 
 def _parts(servo: Servo, words: Mapping[str, str], continuous: bool) -> Parts:
+    """The parts of a servo that are there under these words of its parameters."""
     groups = (servo.parameters, servo.outputs, servo.integrals, servo.states, servo.signals)
     if any(part.only is not None for group in groups for part in group):
         words = {

@@ -25,7 +25,7 @@ def design_points(chosen: Sequence[np.ndarray], cases: int) -> np.ndarray:
 
 
 def in_step(inputs: Sequence[np.ndarray]) -> list[list[int]]:
-    """The groups of inputs that rise together, or one as the other falls; each in the inputs' order.
+    """The groups of inputs that rise together over the cases, or one as the other falls; each in the inputs' order.
 
     inputs  a value a case each; an input that is the same in all cases is in no part
     """

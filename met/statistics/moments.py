@@ -28,6 +28,7 @@ class ExactSum:
 
     @property
     def value(self) -> float:
+        """The sum, rounded once; not-a-number beyond all doubles."""
         try:
             return self._whole / (1 << 1074) if self._finite else math.nan
         except OverflowError:
@@ -44,6 +45,7 @@ class Moments:
         self._first, self._second = ExactSum(), ExactSum()
 
     def add(self, values: np.ndarray) -> None:
+        """Add the finite ones of these values."""
         finite = values[np.isfinite(values)]
         if len(finite):
             if not self.count:
@@ -73,6 +75,7 @@ class Furthest:
         self._above = -math.inf
 
     def add(self, values: np.ndarray) -> None:
+        """Take the next values, and keep the largest."""
         if self._most:
             self._parts.append(values[values > self._above] if self._above > -math.inf else values.copy())
             self._held += len(self._parts[-1])

@@ -29,7 +29,8 @@ share allowed."""
 
 
 def evidence_for(cases: np.ndarray, missed: np.ndarray, share: float) -> np.ndarray:
-    """The logarithm of the evidence that at least this share of all cases meets a requirement.
+    """The logarithm of the evidence (a likelihood ratio that may be looked at after each case) that at least this share
+    of all cases meets a requirement.
 
     cases, missed  so many were run, and so many of these missed it: numbers of one shape
     """
@@ -37,7 +38,8 @@ def evidence_for(cases: np.ndarray, missed: np.ndarray, share: float) -> np.ndar
 
 
 def evidence_against(cases: np.ndarray, missed: np.ndarray, share: float) -> np.ndarray:
-    """The logarithm of the evidence that less than this share of all cases meets a requirement."""
+    """The logarithm of the evidence (a likelihood ratio that may be looked at after each case) that less than this
+    share of all cases meets a requirement."""
     cases, missed = np.asarray(cases, float), np.asarray(missed, float)
     return _mixture(cases, cases - missed, share)
 
@@ -110,6 +112,8 @@ def _reached(
     share: float,
     confidence: float,
 ) -> np.ndarray:
+    """True where the evidence (a likelihood ratio that may be looked at after each case) suffices for this
+    confidence."""
     return np.asarray(evidence(cases, missed, share) >= -math.log1p(-confidence))
 
 

@@ -78,6 +78,7 @@ def bare(sides: Sequence[JointSide], Lambda: Matrix, b_0: Sequence[Real]) -> lis
 
 
 def _decided(side: JointSide, s: Real, qdd: Real, load: Real) -> Real:
+    """The direction of sliding of a joint after one pass: it breaks away, sticks, or stays as it is."""
     need = side.net - load / side.ratio
     breaks_away = both(s == 0.0, absolute(need) > side.dry)
     turned_back = both(s != 0.0, s * qdd < 0.0)

@@ -146,6 +146,7 @@ def _missing(kind: str, needed: Parameter | Memory, whose: str = "") -> tuple[st
 
 
 def _other_unit(needed: Parameter | Memory, declared: Parameter | Memory) -> tuple[str, str]:
+    """The fault of a bed model that declares a number in another unit than all, and the remedy."""
     if declared.unit == needed.unit:
         return f"declares `{needed.name}`, which is no number", f"`{needed.name}`, {needed.unit}: {needed.doc}"
     message = f"declares `{needed.name}` in {declared.unit}, and every bed model has it in {needed.unit}"

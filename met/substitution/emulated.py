@@ -188,6 +188,8 @@ TYPICAL = {
 
 
 def advance(p: Any, held: Any, wire: Wire, time: float, draw: Draw) -> Mapping[str, Real]:
+    """The memory of the bed after `time` s, by name, with the motor's torque at the held voltage as driving torque."""
+
     def driving(w: Real) -> Real:
         return torque(p.kt, p.resistance, p.tau_max, wire.voltage, w)
 

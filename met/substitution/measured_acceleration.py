@@ -20,6 +20,8 @@ from met.trace import Real, exp
 def give(
     p: Sequence[Any], held: Sequence[Any], inputs: Sequence[LawInput], load: Callable[[Sequence[Real]], Sequence[Real]]
 ) -> Sequence[tuple[LawOutput, Mapping[str, Real]]]:
+    """The torque of each load motor and the acceleration of each joint, from the difference of two readings of the
+    shaft's rate, low-passed."""
     shaft = []
     for own, memory, joint in zip(p, held, inputs, strict=True):
         new = (joint.rate - joint.before) / joint.period

@@ -46,7 +46,8 @@ def over(f_cut: Real, time: Real) -> Filter:
 
 
 def _about(lowpass: Filter, x: State, before: State, after: State) -> State:
-    """The state at the end: free motion about a course that begins at `before` and ends at `after`."""
+    """The filter's state at the end of a step: its free motion about the forced one, which takes it from `before` to
+    `after`."""
     y, z = x[0] - before[0], x[1] - before[1]
     (yy, yz), (zy, zz) = lowpass.free
     return after[0] + (yy * y + yz * z), after[1] + (zy * y + zz * z)

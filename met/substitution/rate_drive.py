@@ -28,11 +28,14 @@ def begin(p: Any, w: Real) -> Mapping[str, Real]:
 
 
 def advance(p: Any, held: Any, wire: Wire, time: float, draw: Draw) -> Mapping[str, Real]:
+    """The memory of the bed after `time` s, by name, with the drive's rate loop as driving torque."""
     h = emulated.substep(time)
     loop = RateLoop(p.kp, p.ki, p.v_max)
     integral, tau = held.integral, held.motor_torque
 
     def driving(w: Real) -> Real:
+        """The torque of the drive motor in the next substep, N m, by the drive's rate loop at the shaft's rate w,
+        rad/s."""
         nonlocal integral, tau
         error = wire.drive - w
         voltage = clip(p.kp * error + p.ki * integral, -p.v_max, p.v_max)

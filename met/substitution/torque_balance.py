@@ -27,6 +27,7 @@ def balanced(inputs: LawInput) -> LawOutput:
 def give(
     p: Sequence[Any], held: Sequence[Any], inputs: Sequence[LawInput], load: Callable[[Sequence[Real]], Sequence[Real]]
 ) -> Sequence[tuple[LawOutput, Mapping[str, Real]]]:
+    """The torque of each load motor that balances all torques, and the measured acceleration of each joint."""
     return [
         (LawOutput(balanced(joint).torque, (joint.rate - joint.before) / (joint.period * joint.motor.ratio)), {})
         for joint in inputs

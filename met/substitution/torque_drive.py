@@ -28,6 +28,7 @@ def begin(p: Any, w: Real) -> Mapping[str, Real]:
 
 
 def advance(p: Any, held: Any, wire: Wire, time: float, draw: Draw) -> Mapping[str, Real]:
+    """The memory of the bed after `time` s, by name, with the drive's current loop, a low-pass, as driving torque."""
     h = emulated.substep(time)
     times = 2.0 * math.pi * p.bandwidth * h
     left = exp(-times)

@@ -22,6 +22,8 @@ from met.trace import Real
 def give(
     p: Sequence[Any], held: Sequence[Any], inputs: Sequence[LawInput], load: Callable[[Sequence[Real]], Sequence[Real]]
 ) -> Sequence[tuple[LawOutput, Mapping[str, Real]]]:
+    """The torque of each load motor and the acceleration of each joint: balance of all torques, and a pull towards the
+    rate that the joint's own motor would have."""
     outputs: list[tuple[LawOutput, Mapping[str, Real]]] = []
     for own, joint in zip(p, inputs, strict=True):
         pull = own.gain * joint.inertia / joint.period * (joint.w_ref - joint.w)

@@ -57,6 +57,7 @@ def check_nodes(where: str, nodes: Sequence[Node]) -> None:
 
 
 def _check_results(section: CodeSection, cells: set[str], columns: int, outputs: int) -> None:
+    """Check that a section's stores, records and outputs are known, one each, and numbers. Raises ValueError."""
     for kind, known, results in (
         ("cell", cells, section.stores),
         ("column", range(columns), section.records),
@@ -72,6 +73,7 @@ def _check_results(section: CodeSection, cells: set[str], columns: int, outputs:
 
 
 def _check_control(body: Sequence[RecordedControl], sections: int, cells: set[str]) -> None:
+    """Raise ValueError where control runs a section, or goes by a cell, that there is not."""
     for step in body:
         if isinstance(step, Branch):
             if isinstance(step.condition, WhileAny) and step.condition.cell not in cells:

@@ -33,6 +33,7 @@ def counting(program: Program) -> tuple[Program, tuple[CountedLoop, ...]]:
     loops: list[CountedLoop] = []
 
     def counted(body: tuple[Control, ...], outer: bool) -> tuple[Control, ...]:
+        """The control with a counter in each loop. outer: whether it is in no loop itself"""
         steps: list[Control] = []
         for node in body:
             if isinstance(node, WhileAny):
@@ -54,6 +55,8 @@ def counting(program: Program) -> tuple[Program, tuple[CountedLoop, ...]]:
 
 
 def _come_to(loop: CountedLoop) -> Phase:
+    """The phase that notes that a loop is come to."""
+
     def body(tape: Tape) -> None:
         tape.write(f"{loop.entries}.fresh", 1.0)
 
@@ -61,6 +64,8 @@ def _come_to(loop: CountedLoop) -> Phase:
 
 
 def _turn(loop: CountedLoop) -> Phase:
+    """The phase that counts a turn of a loop, and its entry at the first one."""
+
     def body(tape: Tape) -> None:
         fresh: Real = tape.read(f"{loop.entries}.fresh")
         tape.write(loop.entries, tape.read(loop.entries) + fresh)
@@ -71,6 +76,8 @@ def _turn(loop: CountedLoop) -> Phase:
 
 
 def _giving(names: tuple[str, ...]) -> Phase:
+    """The phase that gives out these counts."""
+
     def body(tape: Tape) -> None:
         for name in names:
             tape.output(name, tape.read(name))

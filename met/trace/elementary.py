@@ -117,7 +117,7 @@ def _polynomial(coefficients: Sequence[float], z: Scalar) -> Scalar:
 
 
 def _quadrant(x: Scalar) -> tuple[Scalar, Scalar, Scalar]:
-    """(t, s, c): the number of quarter turns in t's lowest bits, and sine and cosine of the remainder of x.
+    """The quarter turns of x in the lowest bits of t, and sine and cosine of the remainder: (t, s, c).
 
     The remainder is right to a unit in its last place up to |x| = FARTHEST. Beyond 2^51 it is meaningless: a check
     would cost three operations for every joint that turns, and no angle of an arm gets near.

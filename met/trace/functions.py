@@ -59,6 +59,7 @@ def _elementary(
     """A function of one number in its three forms; not-a-number beyond `farthest`."""
 
     def function(x: Any) -> Any:
+        """The function of a recorded number, an array or a plain number; not-a-number beyond `farthest`."""
         if x.__class__ is Scalar:
             return record(x)
         if isinstance(x, np.ndarray):
@@ -98,6 +99,8 @@ def atan2(y: Real, x: Real) -> Real:
 
 
 def _unary(op: str, doc: str) -> Callable[[Real], Real]:
+    """A function of one number, recorded or plain, that models call by the name `op`."""
+
     def function(x: Any) -> Any:
         if x.__class__ is Scalar:
             return Scalar(x.graph, x.graph.unary(op, x.ref))

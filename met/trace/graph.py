@@ -102,7 +102,7 @@ class Formulas:
 
 
 def _respliced(graph: Nodes, nodes: Sequence[Node], outputs: Sequence[int], values: Mapping[str, Any]) -> list[Any]:
-    """The formulas copied into another graph."""
+    """Outputs of a recorded formula, made again in another graph. values: what stands there for its inputs, by name."""
     makers: dict[str, Any] = {
         "add": graph.add,
         "sub": lambda a, b: graph.add(a, b ^ 1),

@@ -83,7 +83,7 @@ class _Writer:
         self.lines.append(" ".join(map(str, words)))
 
     def _control(self, body: Iterable[RecordedControl]) -> list[Any]:
-        """A body of control, without unneeded parts."""
+        """The part of a program's control on which the results depend: its sections and branches by number."""
         needed: list[Any] = []
         for step in body:
             if isinstance(step, Branch):

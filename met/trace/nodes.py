@@ -137,6 +137,8 @@ class Nodes:
         return self.truth(result) if op in TRUTHS else self.constant(result)
 
     def add(self, a: int, b: int) -> int:
+        """A reference to a + b; to a constant or simpler operation where one will do. Signs are in the last bit of
+        references."""
         if a > b:
             a, b = b, a
         if a < 2:
@@ -152,6 +154,7 @@ class Nodes:
         return self.make("sub", a & -2, b & -2) | sign
 
     def mul(self, a: int, b: int) -> int:
+        """A reference to a b; to a constant or an operand where one will do."""
         sign = (a ^ b) & 1
         a &= -2
         b &= -2
@@ -165,6 +168,7 @@ class Nodes:
         return self.make("mul", a, b) | sign
 
     def div(self, a: int, b: int) -> int:
+        """A reference to a/b; to a product where b is a constant power of two."""
         sign = (a ^ b) & 1
         a &= -2
         b &= -2
@@ -177,7 +181,7 @@ class Nodes:
         return self.make("div", a, b) | sign
 
     def unary(self, op: str, a: int) -> int:
-        """abs, sqrt, floor, rint, pow2, exponent, significand."""
+        """A reference to an operation on one number: abs, sqrt, floor, rint, pow2, exponent or significand."""
         folded = self._fold(op, a)
         if folded is not None:
             return folded
@@ -190,7 +194,7 @@ class Nodes:
         return self.make(op, a)
 
     def fma(self, a: int, b: int, c: int) -> int:
-        """a*b + c, rounded once."""
+        """A reference to a*b + c, rounded once; to a simpler operation where one of them is 0 or 1."""
         if (a & -2) == ZERO or (b & -2) == ZERO:
             return c
         if (c & -2) == ZERO:
@@ -219,6 +223,7 @@ class Nodes:
         return self.make(op, a, b) if folded is None else folded
 
     def equal(self, a: int, b: int) -> int:
+        """A reference to the truth of a = b."""
         if a > b:
             a, b = b, a
         if a & 1:
@@ -242,6 +247,7 @@ class Nodes:
         return None
 
     def both(self, a: int, b: int) -> int:
+        """A reference to the truth that both hold; to a simpler one where one will do."""
         if a > b:
             a, b = b, a
         if a == FALSE or a ^ b == 1:
@@ -251,7 +257,7 @@ class Nodes:
         return self.make("and", a, b)
 
     def where(self, mask: int, a: int, b: int) -> int:
-        """a where the mask holds, else b."""
+        """A reference to a where the mask holds, else to b."""
         if mask & -2 == FALSE:
             return a if mask & 1 else b
         if mask & 1:

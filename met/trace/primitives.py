@@ -81,7 +81,8 @@ def gathered(table: tuple[float, ...], index: float) -> float:
 
 
 def _fused_arrays(a: Any, b: Any, c: Any) -> Any:
-    """`fused` for arrays: exact product and sums, and the small part rounded to odd (Boldo and Melquiond 2008)."""
+    """The fused multiply-add of arrays, a b + c rounded once: exact product and sums, and the small part rounded to odd
+    (Boldo and Melquiond 2008)."""
     a, b, c = np.broadcast_arrays(np.float64(a), np.float64(b), np.float64(c))
     product = a * b
     size = np.abs(product)

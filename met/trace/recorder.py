@@ -44,6 +44,7 @@ class RecordingTape:
         self.parts: list[tuple[int, str]] = []
 
     def _scalar(self, value: Real) -> Scalar:
+        """A value as a number of this recording. Raises ValueError for one of another phase."""
         if isinstance(value, Scalar):
             if value.graph is not self.graph:
                 raise ValueError("a value of another phase: pass it on through a cell")
@@ -90,6 +91,7 @@ class RecordingTape:
 
     @contextmanager
     def part(self, name: str) -> Iterator[None]:
+        """A block whose operations are recorded as a part of this name."""
         outer = self.parts[-1][1] if self.parts else ""
         self.parts.append((len(self.graph.nodes), f"{outer}/{name}" if outer else name))
         yield
@@ -211,6 +213,7 @@ def _refuse_nested_records(program: Program) -> None:
 
 
 def _check_complete(program: Program, sections: list[CodeSection]) -> None:
+    """Check that each column and each output of the program is set by a phase. Raises ValueError."""
     columns = {column for section in sections for column, _ in section.records}
     missing = sorted(set(range(program.columns)) - columns)
     if missing:

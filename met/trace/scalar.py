@@ -74,6 +74,7 @@ class Scalar:
         return Scalar(self.graph, self.graph.unary("abs", self.ref))
 
     def __pow__(self, power: Any) -> Scalar:
+        """The whole power of a number, by multiplications. Refuses powers that are not whole, and those beyond 16."""
         if isinstance(power, float) and power.is_integer():
             power = int(power)
         if not isinstance(power, int) or isinstance(power, bool) or abs(power) > 16:
@@ -184,6 +185,7 @@ class Mask:
         self.ref = ref
 
     def _other(self, other: Any) -> int | None:
+        """The reference of a truth value to join with; None for anything else."""
         if other.__class__ is Mask:
             if other.graph is not self.graph:
                 raise ValueError("two graphs meet in one operation")

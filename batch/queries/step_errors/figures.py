@@ -146,6 +146,7 @@ def together(verifications: Iterable[Verification | None]) -> Verification | Non
 
 
 def _worse(metric_error: MetricError, other: MetricError) -> MetricError:
+    """The worse of the errors of two groups of cases, with the counts of both."""
     worst = other if math.isnan(metric_error.error) or other.error > metric_error.error else metric_error
     return replace(
         worst,

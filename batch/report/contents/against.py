@@ -29,7 +29,8 @@ class ComparedArchive:
     differences: Diff
 
     def of(self, pool: Pool) -> EarlierCases | None:
-        """The cases that match those of a pool; None where there is no such run or sweep."""
+        """The earlier archive's cases that match those of a run or sweep; None where that archive has no such run or
+        sweep."""
         groups = {group.name: group for group in self.file.groups}
         by_name = {experiment.name_b: experiment for experiment in self.differences.experiments}
         pairs = [
@@ -82,8 +83,8 @@ class EarlierCases:
             return {}
 
     def values(self, metric: CaseColumn) -> np.ndarray | None:
-        """The former values of a metric of the pool, in its unit: [case], not-a-number where there is none; None where
-        the other archive has no such metric in this unit."""
+        """The earlier values of a metric, in its unit: [case], not-a-number where there is none; None where the earlier
+        archive has no such metric in this unit."""
         name = metric.key.partition(":")[2]
         mine, theirs = (
             [
@@ -99,8 +100,8 @@ class EarlierCases:
         return np.where(self.in_both, before[self.place], np.nan)
 
     def history_of(self, number: int, position: int) -> tuple[ArchiveGroup, int] | None:
-        """The other archive's group and its position in it, for a case of the pool's structure `number`; None where the
-        other has no history of it."""
+        """The earlier archive's group and the position in it for a case of the structure `number`; None where it has no
+        history of it."""
         for mine, group, experiment in self.pairs:
             if mine == number:
                 matches = np.flatnonzero(experiment.cases.b == position)
@@ -113,7 +114,8 @@ class EarlierCases:
 
 
 def _places(pool: Pool, number: int) -> np.ndarray:
-    """For each position in one of a pool's groups, the place of that case in the pool."""
+    """For each position in the group of structure `number`, the place of that case among the cases of all
+    structures."""
     places = np.flatnonzero(pool.group_of == number)
     out = np.empty(len(places), np.int64)
     out[pool.position_of[places]] = places

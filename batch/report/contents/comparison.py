@@ -111,6 +111,7 @@ def verdict(against: ComparedArchive, pairs: Sequence[tuple[Pool, EarlierCases |
 
 
 def _parts(against: ComparedArchive, pairs: Sequence[tuple[Pool, EarlierCases | None]]) -> tuple[OutcomeCount, ...]:
+    """The number of cases that are identical, equivalent, different, or in only one of the archives."""
     differences = against.differences
     how = np.concatenate([np.zeros(0, np.int8), *(experiment.how for experiment in differences.experiments)])
     counts = {word: int((how == VERDICTS.index(word)).sum()) for word in (IDENTICAL, EQUIVALENT, DIFFERENT)}

@@ -36,8 +36,8 @@ class EarlierHistories:
         self._panels: dict[tuple[bool, str], dict[tuple[str, str], Panel]] = {}
 
     def of(self, case: int, number: int, position: int) -> tuple[History | None, History | None]:
-        """The other archive's history of the case at a position of the pool's structure `number`, and the change since,
-        at the common instants; None where it has no history there."""
+        """The earlier archive's history of the case at a position of the structure `number`, and the change since, at
+        the common instants; None where it has no history there."""
         match_ = self.before.history_of(number, position)
         if match_ is None:
             return None, None
@@ -59,6 +59,7 @@ class EarlierHistories:
         return (History(case, self._clock(was_time), was_values), change) if was_values else (None, None)
 
     def _panels_of(self, other: bool, group: ArchiveGroup) -> dict[tuple[str, str], Panel]:
+        """The panels of a group of either archive, by name and unit, in the page's units."""
         key = other, group.name
         if key not in self._panels:
             known = [self._in_unit(panel) for panel in panels(group)]
@@ -70,6 +71,7 @@ class EarlierHistories:
         return panel if scaled is None else replace(panel, unit=scaled.unit, scale=scaled.scale, in_si=scaled.in_si)
 
     def _clock(self, time: np.ndarray) -> int:
+        """The number of a time axis, thinned, among those of the page."""
         thinned = thin_clock(time, self.points)
         same = [n for n, clock in enumerate(self.clocks) if np.array_equal(clock, thinned)]
         if not same:

@@ -209,7 +209,7 @@ def _all(pool: Pool, attribute: str, form: str = "{}") -> str:
 
 
 def _lede(pool: Pool) -> str:
-    """`37 cases of 20 s each: arm two_link, modified_euler at 25 Hz`."""
+    """A line on what was run: `37 cases of 20 s each: arm two_link, modified_euler at 25 Hz`."""
     table = sum(group.attributes["cases_in_table"] for group in pool.groups)
     cases = f"{pool.count:,} case{'s' if pool.count != 1 else ''}"
     if pool.count < table:
@@ -270,6 +270,7 @@ def _facts(pool: Pool, experiments: Mapping[str, Experiment]) -> Iterator[Fact]:
 
 
 def _sources(archive: ArchiveFile) -> Iterator[SourceListing]:
+    """The archive's deck files, each cut to what a page can hold, with its SHA-256."""
     for name, text in archive.sources().items():
         lines = text.split("\n")
         if lines and not lines[-1]:

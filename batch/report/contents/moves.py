@@ -27,7 +27,7 @@ def metric_moves(pool: Pool, before: EarlierCases, requirement: str) -> tuple[Me
 
 
 def _beyond(pool: Pool, before: EarlierCases, column: CaseColumn) -> np.ndarray:
-    """[case] whether a metric differs by more than its structure's tolerances."""
+    """True of each case in which a metric differs by more than its structure's tolerances, [case]."""
     name = column.key.partition(":")[2]
     now = pool.gathered(name)
     was = np.where(before.in_both, before.pool.gathered(name)[before.place], np.nan)

@@ -64,6 +64,8 @@ def _spans(experiment: Experiment) -> dict[int, tuple[float, float]]:
 
 
 def _row(path: str, quantity: Quantity, spans: Mapping[int, tuple[float, float]]) -> ParameterRow:
+    """The row of a parameter: value, unit, and where it is from. spans: least and greatest value of each formula over
+    the cases"""
     unit = "" if quantity.unit == "1" else pretty_unit(quantity.unit)
     origin = quantity.origin
     return ParameterRow(
@@ -83,6 +85,7 @@ def _origin_text(origin: Origin) -> str:
 
 
 def _value(quantity: Quantity, spans: Mapping[int, tuple[float, float]]) -> str:
+    """A parameter's value in words; one that varies as its range over the cases."""
     match quantity.value:
         case str() as text:
             return text

@@ -144,6 +144,7 @@ class ComputedGroup(ArchiveGroup):
     """A group whose signals are in no archive: those that a run of its experiment would record."""
 
     def __init__(self, group: ArchiveGroup, experiment: Experiment) -> None:
+        """Describe the variables that an archive of the experiment with one recorded case would have."""
         self.__dict__.update(group.__dict__)
         laid = layout(experiment, 1, 1).variables
         self._dimensions = values_of_dimensions(experiment) | {"time": times_of(experiment)}

@@ -24,7 +24,7 @@ MOST_LOOPS = 6
 def stability(
     pool: Pool, experiments: Mapping[str, Experiment], progress: Callable[[int], None] | None = None
 ) -> Stability | None:
-    """The stability of the beds of all structures that have one; None where none has."""
+    """The stability of the motor beds in a sweep, over all structures that have one; None where none has."""
     margins_of: dict[int, tuple[Margin, ...]] = {}
     left = 0
     for number, group in enumerate(pool.groups):
@@ -76,7 +76,7 @@ def _joint_margin(case: Sequence[Margin], joint: str) -> Margin | None:
 
 
 def _bed(joint: str, margins_of_cases: Sequence[Margin | None], spans: bool) -> BedStability:
-    """The stability of a joint's bed over the examined cases; None among these where the joint has no bed."""
+    """The stability of a joint's motor bed over the examined cases; None among these where the joint has no bed."""
     with_bed = [margin for margin in margins_of_cases if margin is not None]
     tightest = min(with_bed, key=lambda margin: margin.room)
     r = np.array([np.nan if margin is None else margin.together for margin in margins_of_cases])

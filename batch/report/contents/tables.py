@@ -93,6 +93,7 @@ def cell_text(column: CaseColumn, place: int) -> str:
 
 
 def _title(pool: Pool, count: int) -> str:
+    """The title of the table of the worst cases. count: how many it shows"""
     every, equal = count == pool.count, pool.ranking.equal(count)
     if any(ENDED[ended] not in ("met", "done") for ended in distinct(pool.ended)):
         many = f" ({equal:,} are equally bad)" if equal else ""

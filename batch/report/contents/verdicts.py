@@ -115,6 +115,7 @@ def _of_answer(pool: Pool, answer: SearchAnswer, experiments: Mapping[str, Exper
 
 
 def _report_warnings(pool: Pool, experiments: Mapping[str, Experiment]) -> tuple[ReportWarning, ...]:
+    """The warnings about a run or sweep, with places in the deck."""
     return tuple(
         ReportWarning(
             campaign_warning.code,
@@ -148,6 +149,8 @@ def _headline(pool: Pool, good: int) -> str:
 
 
 def _demand(pool: Pool, place: int, text: str) -> RequirementCounts:
+    """The counts of a requirement over all cases, and the metric's value that is furthest on its wrong side. place:
+    among the requirements"""
     outcomes = pool.outcomes[:, place]
     met, missed, unknown = (int((outcomes == value).sum()) for value in (1, 0, -1))
     furthest, case = "", None
@@ -162,6 +165,7 @@ def _demand(pool: Pool, place: int, text: str) -> RequirementCounts:
 
 
 def _failing(pool: Pool) -> tuple[FailureRow, ...]:
+    """The causes of failed cases, a row each, with the numbers of their cases."""
     return tuple(
         FailureRow(
             failure.status,
@@ -175,6 +179,7 @@ def _failing(pool: Pool) -> tuple[FailureRow, ...]:
 
 
 def _notes(pool: Pool) -> tuple[str, ...]:
+    """Sentences on cases that were at a limit, of a motor bed or of the arm, and other warnings."""
     notes = []
     limited = int((pool.gathered("bed_limited", 0.0) > 0).sum())
     if limited:

@@ -185,6 +185,7 @@ def comparison(comparison_part: Verdict, changed: Sequence[Child], again: Sequen
 
 
 def _flows(flows: Sequence[RequirementFlow]) -> Html | None:
+    """The table of requirements whose outcome changed in cases of both archives; None where none has."""
     if not flows:
         return None
     rows = [
@@ -415,6 +416,8 @@ def metrics(section: ReportSection) -> Html | None:
 
 
 def _metric(row: MetricRow, single: bool, remarks: bool, compared: bool, verified: bool) -> list[Html]:
+    """The cells of a metric's row. single: there is one case; compared: with earlier values; verified: with errors by
+    the step"""
     before = [row.before] if compared else []
     spread = [page_number(getattr(row.spread, column.field)) for column in SPREAD_COLUMNS]
     values = [*before, page_number(row.spread.median)] if single else [*spread, *before]

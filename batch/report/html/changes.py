@@ -80,6 +80,7 @@ def _noted(notes: Sequence[str]) -> Html | None:
 
 
 def _lines(origin: OtherOrigin) -> list[Html]:
+    """The changed lines of a kind, the first ones shown, others to be unfolded."""
     blocks = [_line(line) for line in origin.lines[:SHOWN_LINES]]
     folded = origin.lines[SHOWN_LINES:]
     if folded:
@@ -129,6 +130,7 @@ def _ended(ending: Ending) -> Html:
 
 
 def _signals(signals: Sequence[SignalRow]) -> Html | None:
+    """The table of signals and metrics before and now; None where there are none."""
     if not signals:
         return None
     used = signal_columns(signals)

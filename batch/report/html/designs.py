@@ -36,8 +36,8 @@ WIDE, HIGH = 640, 120
 
 
 def _progress(answer: DesignAnswer) -> Html | None:
-    """The best value so far over the cases, as steps, with a gap where there is none, or where it was tried with more
-    plants than before; None where it never changed."""
+    """The best value so far over the cases of a search, as steps of a line, with a gap where there is none, or where it
+    was run on more plants (cases to judge it on) than before; None where it never changed."""
     values = [value for _, value, _ in answer.progress if math.isfinite(value)]
     if len(set(values)) < 2:
         return None

@@ -58,6 +58,7 @@ def _replay(report: Report, section: ReportSection) -> str:
 
 
 def _header(report: Report) -> Html:
+    """The head of the page: title, summary, and links to its sections."""
     lede = report.sections[0].lede if len(report.sections) == 1 else f"{len(report.sections)} runs and sweeps."
     links = [*([("changed", "What changed")] if report.changes is not None else []), ("verdict", _verdict_name(report))]
     links += [link for n, section in enumerate(report.sections) for link in _links(n, section, report)]
@@ -109,6 +110,7 @@ def _verdict_name(report: Report) -> str:
 
 
 def _signals_name(section: ReportSection) -> str:
+    """The heading of a section's signals, which may have a drawn arm."""
     page_simulation = section.simulation
     drawn = page_simulation is not None and any(
         structure.arm.scene is not None for structure in page_simulation.structures
@@ -297,6 +299,7 @@ def _parameters(report: Report, anchors: blocks.Anchors) -> Html:
 
 
 def _footer(report: Report) -> Html:
+    """The foot of the page, which says what made it."""
     against = None if report.changes is None else [" against ", el("code", report.changes.before)]
     words = join(
         [

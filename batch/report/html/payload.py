@@ -270,6 +270,7 @@ def _digest(meshes: list[dict[str, Any]]) -> str:
 
 
 def _stability(bed_stability: Stability) -> dict[str, Any]:
+    """The stability of motor beds as data of a plot."""
     return {
         "cases": packed(bed_stability.cases),
         "columns": [_column(column) for column in bed_stability.columns],

@@ -81,8 +81,8 @@ EVIDENCE_HEADS = ("verdict", "missed", "of all cases", "percentile", "worst", "m
 
 
 def evidence(part: EvidencePart) -> Html:
-    """The table of evidence: over each row the requirement and the command that runs its worst case again, beneath each
-    number its limit; notes."""
+    """The table of evidence, what the cases show of each requirement: over each row the requirement and the command
+    that runs its worst case again, beneath each number its limit; notes."""
 
     def cell(text: Child, under: str = "", cls: str | None = "right") -> Html:
         return el("td", el("span", text), el("span", under, cls="under") if under else None, cls=cls)
@@ -165,7 +165,7 @@ def _tornado(row: InfluenceRow, mean: float, low: float, high: float) -> Html:
 
 
 def beds(bed_stability: Stability) -> Html:
-    """The table of the beds' stability, a row for each joint."""
+    """The table of the motor beds' stability, a row for each joint."""
     several = len(bed_stability.beds) > 1
     stable = stable_head(bed_stability.spans)
     heads = ("joint", "law", "servo", "delay", "r, together" if several else "r", stable, "margin")

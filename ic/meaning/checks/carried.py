@@ -46,7 +46,8 @@ class Uncarried:
 def uncarried(
     points: Sequence[tuple[float, float]], interval: float, duration: float, *, integral: bool
 ) -> list[Uncarried]:
-    """The pulses of a course of straight lines whose size is wrong in samples at this interval, s.
+    """The pulses of a course (a value as a function of time) of straight lines whose size is wrong in samples at this
+    interval, s.
 
     integral  whether the integral counts, else the peak
     """
@@ -65,8 +66,8 @@ def uncarried(
 def _judged(
     humps: Iterable[tuple[Hump, float]], interval: float, duration: float, integral: bool
 ) -> Iterator[Uncarried]:
-    """Compare each hump of a course with its samples at this interval, s: height with height, or, with `integral`,
-    integral with integral."""
+    """Compare each hump of a course (a value as a function of time) with its samples at this interval, s: its height
+    with theirs, or its integral with theirs where `integral` is set."""
     for hump, truth in humps:
         begins, ends = float(hump.times[0]), float(hump.times[-1])
         if integral and ends - begins > FEW * interval:

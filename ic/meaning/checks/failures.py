@@ -167,7 +167,7 @@ def _wrong(
 
 
 def _check_full(scope: Scope, failure: ServoFailure, servo: Use) -> None:
-    """Report a runaway drive without a limit."""
+    """Report a failure that drives a joint with all that its servo can give, where that has no limit (D292)."""
     if failure.model.replaced_outputs is None or servo.servo.full is None or servo.parameters is None:
         return
     numbers = servo.parameters

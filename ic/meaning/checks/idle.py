@@ -131,6 +131,8 @@ def _observe_beginning(
     unit, scale = unit_written(known, begins.unit)
 
     def warn(values: np.ndarray) -> None:
+        """Warn where a joint begins beyond an end at which a model of the environment acts (D294). values: [case, 3],
+        position and both ends, SI."""
         q, lower, upper = values.T
         below = (q < lower) & differ_beyond_rounding(q, lower)
         above = (q > upper) & differ_beyond_rounding(q, upper)

@@ -158,6 +158,8 @@ def _observe(scope: Scope, kind: Magnitude, those: list[tuple[str, Settled]]) ->
     assert place is not None  # by the selection
 
     def warn(rows: np.ndarray) -> None:
+        """Warn about the most extreme of the numbers that are beyond their kind's bounds (D297). rows: [case, number],
+        SI."""
         beyond = np.array([_beyond(kind, column) for column in rows.T]).T
         if not beyond.any() or scope.complaints.error_count:
             return
@@ -278,6 +280,8 @@ def _observe_densities(scope: Scope, bodies: Sequence[WeighedBody]) -> None:
     ends = np.cumsum([1 + len(body.sizes) for body in bodies]).tolist()
 
     def warn(rows: np.ndarray) -> None:
+        """Warn about the body whose density is the most extreme (D298). rows: [case, number], the mass and the sizes of
+        each body, SI."""
         odd_bodies = []
         for body, first, last in zip(bodies, [0, *ends], ends, strict=False):
             mass, sizes = rows[:, first], rows[:, first + 1 : last]
@@ -318,6 +322,8 @@ def _observe_inertias(scope: Scope, structure: Structure, bodies: Sequence[Weigh
     ends = np.cumsum([7 + len(body.sizes) for body in bodies]).tolist()
 
     def warn(rows: np.ndarray) -> None:
+        """Warn about the body that is the thinnest by its inertia, and about the smallest (D298). rows: [case, number],
+        mass, inertia and sizes of each body, then the vectors whose lengths add up to the arm's, SI."""
         with np.errstate(over="ignore"):  # an arm of 1e200 m overflows to infinity, which is reported
             arm = np.sqrt((rows[:, ends[-1] :].reshape(len(rows), -1, 3) ** 2).sum(axis=2)).sum(axis=1)
         by_remark: dict[Remark, list[tuple[float, WeighedBody, OddBody, str]]] = {}
@@ -439,6 +445,7 @@ def _others(count: int) -> str:
 def _together(
     scope: Scope, settled: Sequence[Settled], warn: Callable[[np.ndarray], None], bodies: Sequence[WeighedBody]
 ) -> None:
+    """Check bodies once the cases are known, all of them in one call of `warn`."""
     if bodies:
         values: tuple[Real, ...] = tuple(number.value for number in settled)  # type: ignore[misc]  # they are numbers
         scope.checks.observe(values, warn, bodies[0].place, needs=tuple(body.head for body in bodies))

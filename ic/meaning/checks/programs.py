@@ -26,7 +26,7 @@ MOST_CASES = 3
 
 
 def check_beds(complaints: Complaints, experiment: Experiment, memo: AnalysisMemo) -> None:
-    """Warn about each joint on a bed that is unstable in the first case, or in one with an extreme value."""
+    """Warn about each joint whose motor on a bed is unstable in the first case, or in one with an extreme value."""
     if not experiment.structure.substitutions or not experiment.cases.count:
         return
     from met.analysis.margin import margins
@@ -48,7 +48,7 @@ def check_beds(complaints: Complaints, experiment: Experiment, memo: AnalysisMem
 
 
 def bed_warning(experiment: Experiment, margin: Margin, where: str) -> Diagnostic:
-    """A warning about a loop that grows. where: the pose and the case, in words"""
+    """The warning about a motor bed's loop whose motion grows. where: the pose and the case, in words"""
     from met.analysis.margin import remedy
 
     r = margin.least if margin.too_light else margin.together

@@ -33,7 +33,7 @@ def check_reach(scope: Scope, block: MergedBlock, structure: Structure) -> None:
 
 
 def flies_from_afar(experiment: Experiment, name: str) -> bool:
-    """True where the check warns about the grapple of the payload of this name."""
+    """True where the check has warned (D339) that the payload of this name is grappled beyond its link's reach."""
     structure = experiment.structure
     payload = next((candidate for candidate in structure.payloads if candidate.name == name), None)
     looked_at = grapple_numbers(structure, payload, experiment.parameters) if payload is not None else None
@@ -108,7 +108,7 @@ def _way_to(structure: Structure, link: str) -> list[str] | None:
 
 
 def _is_pushed(structure: Structure, payload: Payload, parameters: Mapping[str, Any]) -> bool:
-    """Return True if forces other than uniform gravity may act on a payload in flight."""
+    """Return True if forces other than uniform gravity may act on a payload before it is grappled."""
     known = models.find_own("environment")
     for load in structure.environment:
         model = models.find("environment", load.model, load.place)
@@ -130,6 +130,8 @@ def _observe(scope: Scope, payload: Payload, looked_at: GrappleNumbers, duration
         return  # a missing one is already reported
 
     def warn(rows: np.ndarray) -> None:
+        """Warn about the case in which the payload is furthest beyond the link's reach when it is grappled (D339).
+        rows: [case, number], SI, the time of the grapple first."""
         if scope.complaints.error_count:
             return  # a number may be out of its range
         far, away, reach = looked_at.away(rows, duration)

@@ -269,8 +269,9 @@ class RunNumbers:
         return values, slopes
 
     def motion(self, use: Use) -> tuple[np.ndarray, np.ndarray] | None:
-        """Positions and rates that a command asks for through the run, also where a commanded rate leads; positions are
-        no numbers under any other command, whose values stand for the rates. None where the course is not known."""
+        """Positions and rates that a command asks for at the run's instants, two arrays; those of a commanded rate
+        begin at the joint's initial position. Under a command of another kind positions are not-a-number, and its
+        values stand for the rates. None where the command's values in time are not known."""
         course, kind = self.course(use), use.command.kind if use.command is not None else ""
         if course is None or kind == "position":
             return course

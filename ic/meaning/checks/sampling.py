@@ -132,6 +132,8 @@ def _observe_filter(
     hz = schedule.base_hz / divisor
 
     def warn(rows: np.ndarray) -> None:
+        """Warn where a filter passes frequencies of more than half the rate at which it is read (D335). rows: [case,
+        1], the cut-off in rad/s."""
         cutoff = float(rows.max()) / (2.0 * math.pi)
         if 2.0 * cutoff <= hz * (1.0 + ROUNDING) or scope.complaints.error_count:
             return
@@ -149,12 +151,15 @@ def _observe_filter(
 
 
 def _all_sampled(structure: Structure) -> Iterator[SampledContent]:
-    """The contents of all courses of time and models of the environment, each with the interval at which it is seen."""
+    """The contents (begin, end, frequency, pulses) of all commands, paths and loads that depend on time, each with the
+    interval, s, at which the run samples it."""
     schedule = structure.schedule
 
     def course(
         label: str, path: str, model: str, interval: float, by: str, place: Place | None, *, integral: bool = False
     ) -> Iterator[SampledContent]:
+        """The content of a command's model, if it declares one, with the interval at which it is sampled (s) and by
+        what."""
         profile = models.find("command", model, place)
         if profile.content is not None:
             yield SampledContent(label, path, profile.parameters, profile.content, interval, by, place, integral)
@@ -205,6 +210,8 @@ def _observe(scope: Scope, sampled: SampledContent, schedule: Schedule) -> None:
         return
 
     def warn(rows: np.ndarray) -> None:
+        """Warn where instants of sampling do not resolve what is sampled in a case, or where it begins after the end of
+        the run in some of the cases. rows: [case, number], SI."""
         if scope.complaints.error_count:
             return  # a number may be out of its range
         rows, cases, counts = np.unique(rows, axis=0, return_index=True, return_counts=True)
@@ -228,6 +235,8 @@ def _observe(scope: Scope, sampled: SampledContent, schedule: Schedule) -> None:
 def _remark_late(
     scope: Scope, sampled: SampledContent, begins: float, schedule: Schedule, place: Place, where: str
 ) -> None:
+    """Warn about a command or load that first changes after the end of the run (D334). begins: s; where: the case, in
+    words."""
     scope.complaints.remark(
         "D334",
         f"{sampled.label} does nothing{where}: it first changes at {begins:.9g} s, and the run ends at "

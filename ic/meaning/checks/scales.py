@@ -44,7 +44,8 @@ MOST_CASES = 16
 
 
 def _turns(run: RunNumbers) -> Iterator[Scale]:
-    """Positions of revolute joints at the start, and of the commands of all joints."""
+    """Angles of revolute joints at the start and in their commands, beside a turn; ways of prismatic ones, beside the
+    arm's reach."""
     usual = "joints of published arms turn by at most 1.6 turns"
     for joint in run.structure.independent:
         if joint.kind == "revolute":
@@ -63,6 +64,7 @@ def _turns(run: RunNumbers) -> Iterator[Scale]:
 
 
 def _centres(run: RunNumbers) -> Iterator[Scale]:
+    """The distance of each link's centre of mass from its frame, beside the arm's reach."""
     usual = "of 470 links of published robots none is above 0.42"
     for link in run.structure.links:
         path = f"links.{link.name}.com"
@@ -74,6 +76,7 @@ def _centres(run: RunNumbers) -> Iterator[Scale]:
 
 
 def _offsets(run: RunNumbers) -> Iterator[Scale]:
+    """The distance of each joint from the one before, beside the lengths of the rest of its chain."""
     usual = "of 718 joints of published robots none is above 21.4"
     for joint in run.structure.joints:
         rest = run.depths.get(joint.parent, 0.0) + run.beyond.get(joint.child, 0.0)
@@ -134,7 +137,7 @@ def _gyrations(run: RunNumbers) -> Iterator[Scale]:
 
 
 def _levers(run: RunNumbers) -> Iterator[Scale]:
-    """Points at which models of the environment act on links."""
+    """The distance of points at which models of the environment act on links, beside the arm's reach."""
     usual = "what acts on an arm acts on it, or on what it carries"
     for use in run.structure.environment:
         for parameter in models.find("environment", use.model).parameters:
@@ -178,6 +181,7 @@ def _lasts(run: RunNumbers, name: str) -> bool:
 
 
 def _gears(run: RunNumbers) -> Iterator[Scale]:
+    """The ratio of each gear at a revolute joint."""
     usual = "gears of arms slow their motor down, by 1 to some 3,000"
     for use in run.uses:
         ratio = run.of_motor(use, RATIO.name)
@@ -305,7 +309,7 @@ def _brakes(run: RunNumbers) -> Iterator[Scale]:
 
 
 def _falls(run: RunNumbers) -> Iterator[Scale]:
-    """The fall of a free base under gravity with nothing else that acts on it."""
+    """The fall of a free base under gravity with nothing else acting on it, beside the arm's reach."""
     base, bearing = run.structure.base, [use for use in run.structure.environment if at_rest(use) == "force"]
     for use in run.structure.environment:
         if use.model == "gravity" and base is not None and base.kind == "free" and not bearing and run.reach > 0.0:
@@ -315,6 +319,7 @@ def _falls(run: RunNumbers) -> Iterator[Scale]:
 
 
 def _plays(run: RunNumbers) -> Iterator[Scale]:
+    """The backlash of each gear, beside the motion that its joint is commanded."""
     usual = "within its play a gear drives nothing"
     for use in run.uses:
         path, course = f"{use.joint}.servo.backlash", run.course(use)
@@ -366,6 +371,7 @@ def _bands(run: RunNumbers) -> Iterator[Scale]:
 
 
 def _payloads(run: RunNumbers) -> Iterator[Scale]:
+    """The mass of each payload, beside that of the links that move."""
     arm = sum(run.numbers.get(f"links.{link}.mass", 0.0) for link in run.moved)
     high, typical, usual = 200.0, 0.2, "industrial robots lift a tenth to a third of their mass"
     if not run.gravity.any():
@@ -407,6 +413,7 @@ def _rotors(run: RunNumbers) -> Iterator[Scale]:
 
 
 def _gravities(run: RunNumbers) -> Iterator[Scale]:
+    """The size of gravity beside the Earth's, and gravity that points up."""
     usual = "the Moon has 0.17 of it, Jupiter 2.5, the Sun 28"
     for use in run.structure.environment:
         if use.model == "gravity":
@@ -474,6 +481,8 @@ def check_scales(scope: Scope, structure: Structure, uses: Iterable[Use]) -> Non
         return
 
     def warn(rows: np.ndarray) -> None:
+        """Warn about the number furthest outside its usual range, for each kind of scale (D297). rows: [case, number],
+        SI."""
         if scope.complaints.error_count:
             return
         ranges = dict(zip(numbers_of, np.column_stack([rows.min(axis=0), rows.max(axis=0)]).tolist(), strict=True))

@@ -86,7 +86,7 @@ def loop_warning(experiment: Experiment, loop: Unstable, place: Place | None, wh
 
 
 def _fitting(experiment: Experiment, loop: Unstable) -> str:
-    """The stable gains, in words."""
+    """The gains with which an unstable loop of a servo would be stable, in words."""
     joint, share = loop.joints[0], loop.gain
     if loop.parameters:
         several = [_bound(experiment, loop.case, f"{joint}.servo.{name}", x) for name, x in loop.parameters.items()]

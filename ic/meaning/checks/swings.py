@@ -64,10 +64,10 @@ def check_swing(
     *,
     held: bool,
 ) -> None:
-    """Warn where a swing grows over the run at this step.
+    """Warn where the integrator's steps make a swing x'' = -a x - b x' grow over the run (D249).
 
     label  what swings, in words;  path: of what it belongs to
-    held   whether it is reckoned with a joint that stands still
+    held   whether a and b are those with the joint standing still
     """
     known = models.find_own("integrator")
     if integrator not in known.values():  # another package's is called only to be recorded
@@ -75,6 +75,8 @@ def check_swing(
     steps, h = schedule.ticks // schedule.dynamics, schedule.step
 
     def warn(values: np.ndarray) -> None:
+        """Warn where the steps make the swing x'' = -a x - b x' grow by more than a tenth over the run in some case
+        (D249). values: [case, 2], a in 1/s^2 and b in 1/s."""
         grown = steps * growth(integrator, h, values[:, 0], values[:, 1])
         grown = np.where(np.isfinite(grown), grown, 0.0)
         if (grown > GROWS).any():
@@ -211,7 +213,8 @@ frame as they are large (docs/physics.md, section 3)."""
 
 
 def check_spins(scope: Scope, block: MergedBlock, structure: Structure) -> None:
-    """Warn about bodies that fly from the start, and turn too far in a step for the integrator."""
+    """Warn about free bodies that turn too far in a step for the integrator, from their angular velocity at the start
+    (D300)."""
     integrator, schedule = models.find("integrator", structure.integrator), structure.schedule
     limit = (FIRST if integrator.order == 1 else HIGHER) * (LOST_A_TURN / (2.0 * math.pi)) ** (1.0 / integrator.order)
     for label, path, place in _spinning(block, structure):
@@ -219,6 +222,8 @@ def check_spins(scope: Scope, block: MergedBlock, structure: Structure) -> None:
         settled = [setting.value for name in paths if (setting := scope.parameters.get(name)) is not None]
 
         def warn(rows: np.ndarray, label: str = label, place: Place = place) -> None:
+            """Warn where a body turns too far in a step of the dynamics from the start (D300). rows: [case, 3], its
+            angular velocity, rad/s."""
             fastest = float(np.max(np.sqrt((rows * rows).sum(axis=1))))
             if schedule.step * fastest > limit:
                 fits = slowest_that_fits(schedule, limit)(fastest)

@@ -87,7 +87,8 @@ def use_file(
 def _columns(
     scope: Scope, owner: Owner, profile: Profile, body: MergedBlock, file: Item, own: str, kind: str
 ) -> dict[str, tuple[float, ...]]:
-    """The two lists. Raises Problem."""
+    """The lists of times and values of a trajectory, from the columns of its CSV file, in SI. kind, own: the word and
+    the name by which a column is looked for where none is named. Raises Problem."""
     named = named_file(owner, file)
     wanted, place = _column_name(owner, body.get(COLUMN.name), own), named.place
     if body.get(COLUMN.name) is not None:
@@ -216,7 +217,8 @@ def use_course(
     kind: str = "joint",
     body: MergedBlock | None = None,
 ) -> str | None:
-    """A value, or a course in time, entered in the scope under the path of `spot`: its model; None where there is none.
+    """Enter a value, or a course (a value as a function of time, of a command's model), in the scope under the path of
+    `spot`. Returns its model's name, "constant" for a value; None where it has a mistake.
 
     item    the entry that says it, whose expression is, or holds, `inner`;  body: what of the course is written apart
     doc     what a value means;  column: of a CSV file, unless one is named: the name of the joint, or what `kind` says
@@ -273,7 +275,7 @@ def _check_wraps(scope: Scope, owner: Owner, profile: Profile, values: Mapping[s
 
 
 def _check_room(scope: Scope, owner: Owner, profile: Profile, values: Mapping[str, Any], body: MergedBlock) -> None:
-    """Check that a course made of parts has the time for all of them, in every case."""
+    """Check that the duration `over` of a course in time is long enough for all its parts, in every case."""
     assert profile.shortest is not None
     path, item = owner.join("over"), body.get("over")
     try:
@@ -298,7 +300,7 @@ def _check_room(scope: Scope, owner: Owner, profile: Profile, values: Mapping[st
 
 
 def course_named(scope: Scope, inner: Expression) -> Expression:
-    """The course that a single name stands for, without parameters."""
+    """The call of a command's model that is named without parameters, `file`; other expressions as they are."""
     if isinstance(inner, Name) and inner.text in models.available("command") and not scope.names.is_value(inner):
         return Call(inner, (), (), None, inner.place)
     return inner

@@ -297,7 +297,8 @@ def _of_joints(
 def _courses(
     scope: Scope, owner: Owner, body: MergedBlock, known: Iterable[str], guided: Iterable[str], joints: Iterable[str]
 ) -> tuple[Course, ...]:
-    """The courses of the path's components that are written, in order."""
+    """The courses (values as functions of time) of those components of a guide's path that the deck writes, in order.
+    Mistakes are reported (D274)."""
     courses = []
     for name in known:
         part = body.get(name)
@@ -333,7 +334,8 @@ def _courses(
 
 
 def _course(scope: Scope, owner: Owner, item: Item) -> str | None:
-    """The model of one component's course."""
+    """The command's model that moves one component of a guide's path in time, its parameters entered in the scope; None
+    where it has a mistake, which is reported."""
     kind = component(item.name).kind
     if item.value is None:
         unit = "1 m" if kind == "prismatic" else "30 deg"

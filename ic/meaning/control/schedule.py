@@ -90,6 +90,7 @@ def divisor(complaints: Complaints, rate: Rate, base: Rate, others: list[Rate], 
 
 
 def _fitting(base_hz: float, n: int) -> str:
+    """The n-th part of the base rate in words, so that it can be written exactly."""
     exactly = exact(base_hz) / n
     if exactly.denominator == 1 or float(exactly) == float(f"{float(exactly):.6g}"):
         return f"{hz(float(exactly))} Hz ({hz(base_hz)}/{n})"
@@ -206,6 +207,8 @@ def check_stability(
         slowest = slowest_that_fits(schedule, limit)
 
         def test(values: np.ndarray) -> tuple[np.ndarray, list[str]]:
+            """True of each case in which a decay is unstable with the steps of the dynamics, h lambda at or above the
+            limit, with words about the worst. values: [case, 1], lambda in 1/s."""
             x = h * values[:, 0]
             bad = ~(x < limit)
             if bad.any():
@@ -216,6 +219,8 @@ def check_stability(
             ] if bad.any() else []
 
         def warn(values: np.ndarray) -> None:
+            """Warn where a decay is stable, and too fast for the steps to follow its motion (D105). values: [case, 1],
+            lambda in 1/s."""
             x = h * values[:, 0]
             above = WARN_ABOVE * (1.0 + 1e-9)
             if above < float(np.max(x)) < limit:
@@ -246,6 +251,8 @@ def slowest_that_fits(schedule: Schedule, limit: float) -> Callable[[float], str
     limit."""
 
     def name(fastest: float) -> str:
+        """The slowest rate of the dynamics with which h lambda stays below the limit, in words. fastest: lambda,
+        1/s."""
         if not math.isfinite(fastest):
             return "none"
         most = min(schedule.dynamics, math.ceil(limit * schedule.base_hz / fastest) - 1, 100_000)

@@ -504,7 +504,8 @@ def use_command(scope: Scope, owner: Owner, servo: Any, item: Item | None, used:
 
 
 def _argument(scope: Scope, command: Call) -> Expression:
-    """The argument of a command; the name of a course alone is that course without parameters. Raises Problem."""
+    """The expression of a command's value or trajectory; a name alone is that trajectory without parameters. Raises
+    Problem."""
     inner = command.positional[0]
     if isinstance(inner, String):
         raise Problem(

@@ -100,6 +100,8 @@ def _shared(scope: Scope, item: Item, kind: str, resolve: Resolve) -> SharedServ
 
 
 def _alone(scope: Scope, item: Item, kind: str, definition: Definition, resolve: Resolve) -> SharedServo | None:
+    """A servo resolved at a joint without a name, to be shared by all joints of one kind; None where it has a mistake,
+    or depends on its joint."""
     complaints = Complaints()
     alone = Scope(scope.definitions.reporting_to(complaints), complaints)
     arm = ResolvedArm(ANY, (), (Joint(ANY, kind, "", ""),))  # type: ignore[arg-type]  # that of a joint that moves

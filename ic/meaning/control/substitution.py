@@ -45,7 +45,8 @@ USAGE = "write `substitute JOINT { bed = BED(...);  law = LAW(...); }`"
 def resolve_substitutions(
     scope: Scope, block: MergedBlock, arm: ResolvedArm, uses: list[Use]
 ) -> tuple[Substitution, ...]:
-    """Every joint whose motor is on a bed, in the arm's order; those that failed join `scope.failed_servos`."""
+    """Each joint whose motor is on a bed (a real or emulated test bench) with its bed's and its law's model, in the
+    arm's order; joints that failed join `scope.failed_servos`."""
     servos = {use.joint: use for use in uses}
     by_joint: dict[str, tuple[Substitution, Place]] = {}
     for item in block.of_kind("substitute"):
@@ -77,7 +78,7 @@ def resolve_substitutions(
 def check_ticks(
     scope: Scope, substitutions: tuple[Substitution, ...], ticks: Mapping[str, Ticks], schedule: Schedule
 ) -> None:
-    """Check that the servos of substituted joints tick, and together."""
+    """Check that the servos of joints on motor beds tick, and all at the same instants."""
     for use in substitutions:
         if ticks[use.joint].continuous and use.place is not None:
             scope.complaints.error(
@@ -112,7 +113,8 @@ def check_ticks(
 
 
 def check_brakes(scope: Scope, substitutions: tuple[Substitution, ...], environment: Iterable[EnvironmentUse]) -> None:
-    """Check that no model puts dry friction on a joint whose motor is on a bed: there friction is the bed's."""
+    """Check that no model puts dry friction on a joint whose motor is on a bed, since its friction is the real
+    motor's."""
     for use in environment:
         friction_joint = models.find("environment", use.model).friction_joint
         joint = scope.parameters.get(f"environment.{use.name}.{friction_joint}") if friction_joint else None
@@ -149,7 +151,8 @@ def check_runaways(
 def _substitution(
     scope: Scope, item: Item, arm: ResolvedArm, servos: Mapping[str, Use]
 ) -> tuple[Substitution, Place] | None:
-    """The joint's bed and law, and the place that names the law; None where something failed (already reported)."""
+    """The models of a joint's bed and law, and the place that names the law; None where something failed (already
+    reported)."""
     if item.name in arm.failed:
         return None
     if item.value is not None or item.detail:
@@ -280,7 +283,8 @@ def _name_place(value: Expression) -> Place:
 
 
 def _model(scope: Scope, kind: models.Kind, item: Item | None, around: Item) -> Any:
-    """The model of a bed or a law, the default where none is named; None where that failed (already reported)."""
+    """The model of a motor bed or of a law, the default where none is named; None where that failed (already
+    reported)."""
     if item is None or item.value is None:
         return models.find(kind, DEFAULTS[kind], around.place)
     model = find_model(scope, kind, word_of(item.value), _name_place(item.value))
@@ -290,7 +294,7 @@ def _model(scope: Scope, kind: models.Kind, item: Item | None, around: Item) -> 
 
 
 def _scale(scope: Scope, joint: str, item: Item) -> BedScale | None:
-    """The scales of a joint's bed; None where one of them is wrong (already reported)."""
+    """The scales between a joint's motor and the one on its bed; None where one of them is wrong (already reported)."""
     before = scope.complaints.error_count
     body, path = body_of(scope, item), f"{joint}.bed.{SCALE.name}"
     owner = Owner(f"the scale of joint `{joint}`'s bed", item.place, path, homes=item.homes)
@@ -322,7 +326,7 @@ def _not_its_quotient(table: np.ndarray) -> tuple[np.ndarray, list[str]]:
 
 
 def _check_strength(scope: Scope, owner: Owner, use: Use, scale: BedScale, scaled: Item) -> None:
-    """Warn where the bed's motor reaches its largest torque before the joint's would."""
+    """Warn where the motor on the bed reaches its largest torque before the joint's own would (D366)."""
     path, servo_path = owner.join("tau_max"), f"{use.joint}.servo.tau_max"
     own, joints = scope.parameters.get(path), scope.parameters.get(servo_path)
     if own is None or joints is None:
@@ -331,6 +335,8 @@ def _check_strength(scope: Scope, owner: Owner, use: Use, scale: BedScale, scale
     values: tuple[Any, ...] = (own.value, joints.value, scale.torque)
 
     def warn(table: np.ndarray) -> None:
+        """Warn about the first case in which the motor on the bed is weaker than the joint's (D366). table: [case, 3],
+        the largest torque of each of the two, N m, and the scale of torque between them."""
         weak = np.flatnonzero(table[:, 0] * table[:, 2] < (1.0 - 1e-9) * table[:, 1])
         if not weak.size:
             return
@@ -352,8 +358,9 @@ def _check_strength(scope: Scope, owner: Owner, use: Use, scale: BedScale, scale
 
 
 def _use_bed(scope: Scope, owner: Owner, bed: Any, body: MergedBlock, use: Use, scale: BedScale | None = None) -> None:
-    """Every parameter of a bed: as in the deck, else from the word of its faults, the servo's, or the default. For a
-    scaled bed, the servo's value is divided by its scale, so that the motor is an exact model of the joint's."""
+    """Enter every parameter of a motor bed: as in the deck, else from the word of its faults, the servo's value, or the
+    default. A bed with a `scale` divides the servo's value by it, so that its motor is an exact model of the
+    joint's."""
     written = models.written(bed)
     check_keys(scope, body, [p.name for p in written], owner)
     faults, preset = None, {}

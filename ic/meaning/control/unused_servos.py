@@ -81,7 +81,7 @@ def check_on_a_joint(scope: Scope, name: str) -> None:
 
 
 def _is_of_a_file(inner: Expression) -> bool:
-    """Return True for a course from a file, which is read by the joint's name."""
+    """Return True for a command from a CSV file, which is read by the joint's name."""
     body = inner.body or () if isinstance(inner, Call) else ()
     words = [word for word, _ in inner.named] if isinstance(inner, Call) else []
     words += [setting.path[-1] for setting in body if isinstance(setting, Setting)]

@@ -132,6 +132,7 @@ class CsvTable:
         return [(cell, self._cell(line, row, column.number)) for cell, line, row in cells]
 
     def _numbers(self, column: CsvColumn, measure: Measure) -> tuple[float, ...]:
+        """The numbers of a column in SI. Raises Problem for a cell without one."""
         numbers = []
         for number in range(len(self.rows)):
             si = _si(self._text(column, number), measure)
@@ -159,6 +160,7 @@ class CsvTable:
                 )
 
     def _cell(self, line: int, row: str, number: int) -> Place:
+        """The place of cell `number` in a row's text."""
         cells = _cells(row)
         text, gap = _stripped(cells[number])
         start = sum(len(cell) + 1 for cell in cells[:number]) + gap

@@ -270,6 +270,7 @@ class _Merger:
         return self.items[keys[0]] if keys else None
 
     def _append(self, entry: Setting, name: str) -> None:
+        """Append the value of a `+=` to the list of an entry before it. Raises Problem D056 where there is none."""
         earlier = self._earlier("", name, entry.place)
         if earlier is None or earlier.value is None:
             lists = [item.name for item in self.items.values() if item.value is not None and item.kind != WITH]

@@ -60,6 +60,7 @@ class Definitions:
     """All definitions and lets of a deck, by kind and name; and the CSV and URDF files that it names."""
 
     def __init__(self, deck: Deck, complaints: Complaints) -> None:
+        """Enter all definitions and `let`s of a deck; mistakes in them are reported."""
         self.lets: dict[str, Let] = {}
         self.csv_files = csv_files(deck)
         self.robot_files = RobotFiles(deck)
@@ -500,6 +501,7 @@ class Definitions:
         self._by_kind[kind][name.text] = definition
 
     def _check_defaults(self) -> None:
+        """Report a second `default` of a file (D050)."""
         first: dict[str, Definition] = {}  # of each file: decks that can be included together have one each
         for default in self._defaults():
             known = first.setdefault(default.place.file, default)
@@ -551,6 +553,7 @@ def _let_twice(entry: Let, earlier: Let) -> Diagnostic:
 
 
 def _single(name: Name) -> Word:
+    """The only word of a definition's name. Raises Problem D059 for a path."""
     if len(name.path) > 1:
         raise Problem(
             error(

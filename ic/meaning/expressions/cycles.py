@@ -96,7 +96,7 @@ def ambiguous_unit(value: Value, text: str, wanted: Measure) -> AmbiguousUnit | 
 
 
 def _hertz_for_rate(value: Value) -> AmbiguousUnit:
-    """Hz for 1/s."""
+    """What is unclear about a value in Hz where 1/s is wanted, with what to write for either meaning."""
     number = _number(value)
     if isinstance(value.number, Scalar):
         return AmbiguousUnit(
@@ -135,7 +135,8 @@ def _no_hertz(value: Value) -> AmbiguousUnit | None:
 
 
 def _hertz_for_rad(value: Value, text: str) -> AmbiguousUnit:
-    """V/Hz for V*s/rad."""
+    """What is unclear about a value in a unit with Hz, such as V/Hz, where one with rad, V*s/rad, is wanted, with what
+    to write for either meaning."""
     unit = _unit(value)
     if unit is not None and "kHz" not in unit.text:
         number = _in(value, unit)
@@ -152,12 +153,14 @@ def _hertz_for_rad(value: Value, text: str) -> AmbiguousUnit:
 
 
 def _no_angle(value: Value, text: str, power: int) -> AmbiguousUnit:
-    """1/mm for rad/m, and mm for m/rad."""
+    """What is unclear about a value without an angle, such as 1/mm, where a unit with rad, rad/m, is wanted, with what
+    to write for radians and for turns. power: of the missing rad."""
     unit = _unit(value)
     number = _number(value) if unit is None else _in(value, unit)
     plain = unit.text if unit is not None else units.text(value.dimension)
 
     def angled(angle: str) -> str:
+        """The value as a deck writes it with this angle's unit in the place where the angle is missing."""
         angle = angle if abs(power) == 1 else f"{angle}^{abs(power)}"
         if power < 0:
             return f"{number} {plain}/{angle}"
@@ -204,6 +207,7 @@ def _in(value: Value, unit: Unit) -> str:
 
 
 def _written(value: Value) -> str:
+    """A value as the deck writes it, with its unit."""
     unit = _unit(value)
     if unit is not None:
         return f"{_in(value, unit)} {unit.text}"

@@ -162,6 +162,7 @@ def _leaf(expression: Expression, lookup: Lookup) -> Value | ValueList:
 
 
 def _number(number: Number) -> Value:
+    """The value of a number with its unit, SI."""
     if number.unit is None:
         hertz = None if _of_pi(number.text) else 0
         return Value(
@@ -198,6 +199,8 @@ def _with_unit(expression: WithUnit, lookup: Lookup) -> Value | ValueList:
     measure_of(expression.unit)
 
     def apply(value: Value | ValueList) -> Value | ValueList:
+        """A bare value, or a list of such, in the unit behind the brackets. Raises Problem D062 for a value that has a
+        unit."""
         if isinstance(value, ValueList):
             return ValueList(tuple(apply(item) for item in value.items), value.place, expression.unit)
         if value.dimension != PURE:
@@ -227,6 +230,7 @@ def _written_unit(expression: Expression) -> Place | None:
 
 
 def _unary(expression: Unary, lookup: Lookup) -> Value | ValueList:
+    """The value behind a sign. Raises Problem D064 for `not`."""
     if expression.operator == "not":
         raise Problem(error("D064", "`not` stands only in `exclude when`", expression.place))
     value = evaluate(expression.operand, lookup)
@@ -237,6 +241,7 @@ def _unary(expression: Unary, lookup: Lookup) -> Value | ValueList:
 
 
 def _binary(node: Binary, left: Value | ValueList, lookup: Lookup) -> Value | ValueList:
+    """The value of arithmetic on two values or lists. Raises Problem D064 for a comparison."""
     operator = node.operator
     if operator in COMPARISONS or operator in ("and", "or"):
         raise Problem(
@@ -486,6 +491,8 @@ USAGE = {
 
 
 def _sqrt(call: Call, value: Value) -> Value:
+    """The root of a value, with half its dimension. Raises Problem D066 for a negative number, D068 where the dimension
+    has no half."""
     exponents = value.dimension
     if any(exponent % 2 for exponent in exponents):
         exponents = units.counted(exponents)  # beside a mass or a length a radian counts as one: sqrt(stiffness * j)

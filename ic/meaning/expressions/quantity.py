@@ -196,6 +196,7 @@ def _list_of(items: list[Value], place: Place) -> ValueList:
 
 
 def _numbers(written: ValueList) -> list[Value]:
+    """The numbers of a list. Raises Problem D071 for a list in it."""
     numbers = [item for item in written.items if isinstance(item, Value)]
     inner = next((item for item in written.items if isinstance(item, ValueList)), None)
     if inner is not None:

@@ -83,7 +83,7 @@ MOST_POINTS = 100_000
 
 
 def range_of(expression: Range, first: Value, last: Value, step: Value) -> ValueList:
-    """`first .. last by step`: steps from the first, as far as the last."""
+    """The numbers of a range `first .. last by step`: steps from the first, as far as the last."""
     place = place_of(expression)
     for other in (last, step):
         if not units.same(first.dimension, other.dimension):

@@ -117,6 +117,8 @@ class Truths:
         return None
 
     def _of_numbers(self, expression: Binary, mask: np.ndarray) -> np.ndarray:
+        """The rows in which a comparison of numbers holds, [row]; it holds in none where a side is not-a-number. mask:
+        rows that count."""
         compared = self._read.get(id(expression))
         if compared is None:
             compared = self._read[id(expression)] = self._comparison(expression)

@@ -106,8 +106,8 @@ class SharedArm:
 
 
 def packed_arm(definitions: Definitions, name: str) -> bytes:
-    """The arm of a definition in the form shared by runs, for `bring_arm`; empty where it was not resolved, or cannot
-    be."""
+    """A definition's arm in the form that runs share, for `bring_arm`; empty where it was not, or cannot be,
+    resolved."""
     shared = definitions.memo.get(_memo_key(name))
     if isinstance(shared, bytes):
         return shared
@@ -203,6 +203,8 @@ def _resolved(
     ends = {item.name: None for item in block.of_kind("link")}
 
     def part(item: Item) -> Part:
+        """The links, joints or loop that an item of the arm's block stands for, taken from `shared` where they are
+        there."""
         known = shared.get((item.kind, item.name))
         if known is not None:
             known.entries.enter(scope)
@@ -280,8 +282,8 @@ def _stray(scope: Scope, item: Item, block: MergedBlock) -> None:
 
 
 def resolve_link(scope: Scope, item: Item, homes: tuple[str, ...]) -> Part:
-    """A link of an arm, with its numbers entered as parameters; of a boom its pieces; empty where it has no block
-    (already reported)."""
+    """A link of an arm, or a boom's pieces, its numbers entered as parameters; empty where it has no block
+    (reported)."""
     owner = Owner(f"link `{item.name}`", item.place, f"links.{item.name}", homes=homes)
     written_boom = [word.text for word in item.detail] == [BOOM.name]
     is_boom = written_boom and item.name != BASE
@@ -320,6 +322,7 @@ def resolve_link(scope: Scope, item: Item, homes: tuple[str, ...]) -> Part:
 def _joint(
     scope: Scope, item: Item, homes: tuple[str, ...], block: MergedBlock, links: Mapping[str, None]
 ) -> Joint | None:
+    """The joint of an item, its frame and limits resolved; None where it has a mistake, which is reported."""
     owner = Owner(f"joint `{item.name}`", item.place, item.name, homes=homes)
     if refuse_foreign_joint(scope, item, homes[-1], block):
         return None
@@ -436,6 +439,7 @@ def _frame(scope: Scope, owner: Owner, kind: str, body: MergedBlock) -> None:
 
 
 def _end(scope: Scope, owner: Owner, key: str, item: Item | None, known: Mapping[str, None]) -> str | None:
+    """The link's name that `parent` or `child` of a joint has; None where it has no link's (reported: D092 to D094)."""
     if item is None:
         scope.complaints.missing(
             owner.place, (key,), "D092", f"{owner.label} has no {key}", help=f"write `{key} = LINK;`"
@@ -477,6 +481,7 @@ def _end(scope: Scope, owner: Owner, key: str, item: Item | None, known: Mapping
 
 
 def _axis(scope: Scope, owner: Owner, kind: str, item: Item | None) -> None:
+    """Resolve the axis of a joint as three parameters of length 1, or report what is wrong (D065, D095 to D097)."""
     if kind == "fixed":
         if item is not None:
             helps = leave_out("leave `axis` out")

@@ -112,6 +112,7 @@ def _stiffness(scope: Scope, owner: Owner, body: MergedBlock, across: tuple[str,
 
 
 def _nodes(scope: Scope, owner: Owner, body: MergedBlock) -> int | None:
+    """The number of nodes at which a boom bends; None where it has a mistake, which is reported (D084)."""
     item = body.get(NODES.name)
     if item is None:
         scope.keep_setting(owner.join(NODES.name), float(DEFAULT_NODES), "1")
@@ -218,6 +219,7 @@ class _Boom:
         return Joint(name, kind, parent, child, self.link.place)  # type: ignore[arg-type]  # of two kinds
 
     def _enter_matter(self, name: str, mass: Real, com: Sequence[Real], moments: Sequence[Real]) -> None:
+        """Enter mass, centre of mass and moments of inertia of a boom's piece, SI."""
         head = f"links.{name}"
         self._keep(f"{head}.mass", mass, "kg")
         self._enter(f"{head}.com", com, "m")

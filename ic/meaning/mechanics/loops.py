@@ -31,8 +31,8 @@ def leaders_in_words(leaders: Sequence[str]) -> str:
 
 
 def use_follows(scope: Scope, owner: Owner, body: MergedBlock, arm: MergedBlock) -> tuple[str, ...] | None:
-    """The joints that a joint follows, with ratios and offset entered as parameters; none where it moves by itself, and
-    None where there is a mistake (already reported). arm: all entries of its arm"""
+    """The joints that a joint's motion follows from (`follows`), with ratios and offset entered as parameters; none
+    where it moves by itself, and None where there is a mistake (already reported). arm: all entries of its arm"""
     item = body.get("follows")
     if item is None:
         for name in ("ratio", "offset"):
@@ -94,7 +94,7 @@ def _named(scope: Scope, owner: Owner, item: Item, kinds: dict[str, str]) -> tup
 
 
 def check_followers(scope: Scope, joints: Sequence[Joint]) -> None:
-    """Report joints that follow each other in a circle."""
+    """Report joints that are each made to follow the other, in a circle."""
     known = {joint.name: joint for joint in joints}
     for joint in joints:
         if joint.place is not None and follows_itself(joint.name, known):
@@ -119,7 +119,8 @@ def all_led_by(joint: Joint, joints: Sequence[Joint]) -> list[Joint]:
 
 
 def begin_followers(scope: Scope, joints: Sequence[Joint]) -> None:
-    """Settle where joints that follow others begin, q and qd, once those that lead are settled."""
+    """Settle position and rate at the start of joints that follow others (by ratios and an offset), once those are
+    settled."""
     waiting = [joint for joint in joints if joint.follows]
     while waiting:
         ready = [joint for joint in waiting if not {other.name for other in waiting} & set(joint.follows)]
@@ -172,7 +173,8 @@ def resolve_loop(scope: Scope, owner: Owner, body: MergedBlock, link: str | None
 
 
 def close_loops(scope: Scope, joints: Sequence[Joint], loops: Sequence[Loop]) -> list[Joint]:
-    """The joints of an arm, where two of each loop follow the one that leads; mistakes are reported."""
+    """The joints of an arm with loops, each of which makes two of its joints follow from the one that leads; mistakes
+    are reported."""
     by_name = {joint.name: joint for joint in joints}
     for loop in loops:
         names = [joint.name for joint, _ in ring(loop, joints)]
@@ -201,7 +203,8 @@ def close_loops(scope: Scope, joints: Sequence[Joint], loops: Sequence[Loop]) ->
 
 
 def begin_in_loop(scope: Scope, joint: Joint, joints: Sequence[Joint]) -> None:
-    """Settle where a joint begins that follows by a loop; the first of these reports a loop that does not close."""
+    """Settle where a joint begins whose position follows from a loop's leader; the first of these reports a loop that
+    does not close."""
     loop = joint.loop
     assert loop is not None
 
@@ -260,6 +263,8 @@ def _check(scope: Scope, loop: Loop, corners: Sequence[Corner], q: Real, closed:
         return table.max(axis=1) > TOLERANCE**2, [f"by {names[int(np.argmax(table.max(axis=0)))]}"]
 
     def opens(table: np.ndarray) -> tuple[np.ndarray, list[str]]:
+        """True of each case in which a loop does not close, and the reason in words. table: [case, 4], the last three
+        the sides of the loop's triangle, m"""
         bad = np.isnan(table[:, 0])
         v, p, r = table[np.argmax(bad), 1:]
         if not (p > 0.0 and r > 0.0):

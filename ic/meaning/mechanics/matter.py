@@ -56,7 +56,7 @@ def _size(name: str, doc: str) -> Parameter:
 
 
 def _turned(along: int, own: Real, across: Real) -> Three:
-    """`own` on the axis `along`, `across` on the others."""
+    """Three numbers by axis: `own` on the axis `along`, `across` on the others."""
     x, y, z = (own if axis == along else across for axis in range(3))
     return (x, y, z)
 
@@ -79,6 +79,7 @@ def box(p: Mapping[str, Real], along: int) -> Solid:
 
 
 def cylinder(p: Mapping[str, Real], along: int) -> Solid:
+    """The solid cylinder of unit mass with these sizes, m, from the frame's origin along an axis (0, 1, 2)."""
     radius = p["radius"] * p["radius"]
     across = radius / 4.0 + p["length"] * p["length"] / 12.0
     return Solid(
@@ -179,6 +180,7 @@ def _shape(scope: Scope, owner: Owner, item: Item | None) -> Solid | None:
 
 
 def _com(scope: Scope, owner: Owner, kind: str, item: Item | None, solid: Solid | None) -> None:
+    """Enter the centre of mass: as written, else the middle of the shape, else 0."""
     if item is not None or solid is None:
         scope.vector(owner, replace(_of_kind(COM, kind), default=(0.0, 0.0, 0.0)), item)
         return

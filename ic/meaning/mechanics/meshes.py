@@ -58,6 +58,8 @@ def _written(scope: Scope, item: Item) -> Iterator[tuple[Expression | None, Merg
 def _mesh(
     scope: Scope, owner: Owner, item: Item, number: str, value: Expression | None, body: MergedBlock
 ) -> Mesh | None:
+    """One mesh file of a body with where it is placed (m, rad, scale); None where it has a mistake, which is reported
+    (D076, D122). A file that cannot be read is a warning (D219), and the body is drawn without it."""
     place = item.place if value is None else place_of(value)
     named = value.positional[0] if isinstance(value, Call) and len(value.positional) == 1 else value
     if not isinstance(named, String) or (named is not value and word_of(value) != PLACED):

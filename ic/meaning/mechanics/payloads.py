@@ -38,7 +38,7 @@ def resolve_payloads(scope: Scope, block: MergedBlock, arm: ResolvedArm) -> tupl
 
 
 def check_payloads(scope: Scope, block: MergedBlock, structure: Structure) -> None:
-    """Check payloads against the rest of the run: whether they may fly, and the times of their events."""
+    """Check payloads against the rest of the run: whether they may be free bodies, and the times of their events."""
     items = {item.name: item for item in block.of_kind("payload")}
     for payload in structure.payloads:
         item = items[payload.name]
@@ -158,6 +158,7 @@ def _check_unused(scope: Scope, item: Item, body: MergedBlock, grappled: bool) -
 
 
 def _check_order(scope: Scope, item: Item, times: list[Real | None], place: Place) -> None:
+    """Check that a payload is released after it is grappled, in every case (D264). times: of both, s."""
     grapple, release = times
     if grapple is None or release is None:
         return
@@ -175,7 +176,7 @@ def _check_order(scope: Scope, item: Item, times: list[Real | None], place: Plac
 
 
 def _check_solid(scope: Scope, owner: Owner, payload: Payload, item: Item) -> None:
-    """Check that a flying payload has mass, and inertia about every axis."""
+    """Check that a payload that is a free body for a time has mass, and inertia about every axis."""
     paths = [owner.join("mass"), *(owner.join(f"inertia.{entry}") for entry in INERTIA)]
     settled = [scope.parameters.get(path) for path in paths]
     if any(setting is None or isinstance(setting.value, str | tuple) for setting in settled):
@@ -203,7 +204,7 @@ def _not_in_order(pairs: np.ndarray) -> tuple[np.ndarray, list[str]]:
 
 
 def _not_solid(values: np.ndarray) -> tuple[np.ndarray, list[str]]:
-    """The rows [n, 7], mass and moments, of bodies that cannot fly, as a mask, and the reason in words."""
+    """The rows [n, 7], mass and moments, of bodies that cannot move freely, as a mask, and the reason in words."""
     mass, xx, yy, zz, xy, xz, yz = values.T
     least, _, most = np.linalg.eigvalsh(np.stack([xx, xy, xz, xy, yy, yz, xz, yz, zz], axis=-1).reshape(-1, 3, 3)).T
     bad = ~((mass > 0.0) & (least > 1e-9 * most))

@@ -21,6 +21,8 @@ def in_run(definitions: Definitions, block: MergedBlock, item: Item, rates: tupl
 
 
 def _of_path(definitions: Definitions, block: MergedBlock, item: Item, rates: tuple[str, ...]) -> list[str]:
+    """Remedies for an entry of a run that is written as a path, by what the path's words name; none where they name
+    nothing."""
     joints, links, arm = _of_arm(definitions, block)
     value = spell(item.value) if item.value is not None else "..."
     match item.name.split("."):

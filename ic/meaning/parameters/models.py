@@ -320,7 +320,8 @@ def _alike(scope: Scope, owner: Owner, column: CsvColumn, by_column: Mapping[str
 
 
 def _columns(scope: Scope, owner: Owner, lists: list[Parameter], item: Item) -> dict[str, tuple[float, ...]]:
-    """The lists. Raises Problem."""
+    """The lists of a model's table by their parameters' names, from the columns of a CSV file, in SI. Raises
+    Problem."""
     named = named_file(owner, item)
     table = scope.definitions.csv_files.get(named)
     by_column = {TIME if parameter.rises else parameter.name: parameter for parameter in lists}

@@ -150,6 +150,7 @@ def _count(numbers: tuple[float, ...]) -> str:
 
 
 def _place(owner: Owner, body: MergedBlock, name: str) -> Place:
+    """The place of a parameter's value, or of its owner where none is written."""
     item = body.get(name)
     if item is None:
         return owner.place

@@ -98,8 +98,7 @@ class Scope:
         return self.parameters.get(path) or self.auxiliary.get(path)
 
     def depends_on_failed(self, path: str) -> bool:
-        """Return True if this path cannot be judged, since something that it depends on has failed (already
-        reported)."""
+        """Return True if this path cannot be judged, since what it depends on has failed (already reported)."""
         first, *rest = self.definitions.split(path)
         thing = (rest or [""])[0] if first in ("links", "payloads") else first
         if self.checks.touches_failed(path) or thing in self.failed_parts:
@@ -303,8 +302,7 @@ class Scope:
     def keep_setting(
         self, path: str, value: Real | str, unit: str = "", item: Item | None = None, note: str = ""
     ) -> None:
-        """Keep a setting that decides the program, for questions about its origin; item: its entry, None for a
-        default."""
+        """Keep a setting that decides the program, for questions about its origin. item: its entry; None: a default."""
         origin = Origin("default", note=note)
         if item is not None:
             place = item.place if item.value is None else place_of(item.value)
@@ -407,6 +405,7 @@ class Scope:
         return value
 
     def _missing(self, owner: Owner, wanted: Parameter) -> None:
+        """Report a parameter that has neither value nor default (D075), unless that is known already."""
         self.checks.fail(owner.join(wanted.name))
         servos = self.definitions.of_kind("servo")
         bases = [servos[home].place for home in owner.homes if home in servos]
@@ -437,7 +436,7 @@ class Scope:
         record: bool,
         part: Expression | None = None,
     ) -> Real | None:
-        """part: of the item's expression, what this number was written as; None where that is the whole of it."""
+        """Settle one number: written, varied, set or default. part: the expression's part that says it; None: all."""
         homes = owner.homes if item is None else item.homes
         place = owner.place if item is None else item.place
         value: Real | None = None
@@ -475,7 +474,8 @@ class Scope:
         needs: tuple[str, ...] = (),
         paths: tuple[str, ...] | None = None,
     ) -> Real:
-        """paths: all of the parameter (`Owner.paths`), where they are at hand."""
+        """Enter a settled number under its paths (`Owner.paths`, unless they are given), with the settings that replace
+        it."""
         path = owner.join(name)
         paths = owner.paths(name, homes) if paths is None else paths
         for known in paths:

@@ -35,7 +35,7 @@ def how_to_write(owner: Owner, wanted: Parameter) -> list[str]:
 
 
 def of_a_rate(owner: Owner) -> list[str]:
-    """The remedies for a course under a `rate` command that may be taken for another."""
+    """The remedies for a trajectory under a `rate` command that may be meant as positions."""
     course = models.find_own("command").get(owner.label.strip("`")) if owner.call and owner.command == "rate" else None
     return [course.of_a_rate] if course is not None and course.of_a_rate else []
 
@@ -177,6 +177,8 @@ class ValueChecks:
         unit = "" if text == "1" else f" {text}"
 
         def test(values: np.ndarray) -> tuple[np.ndarray, list[str]]:
+            """True of each case in which the number is out of its bounds, with words about the first. values: [case,
+            1]"""
             bad = ~np.isfinite(values[:, 0])
             for bound, _, holds in bounds:
                 bad |= ~holds(values[:, 0], bound)
@@ -207,7 +209,7 @@ class ValueChecks:
         )
 
     def _of_another_command(self, owner: Owner, wanted: Parameter, value: Value, text: str) -> list[str]:
-        """The remedy where a course's parameter has the unit of another kind of command."""
+        """The remedies where a command, or a parameter of its trajectory, has the unit of another kind of command."""
         if owner.command is None:
             return []
         fits = [

@@ -137,6 +137,7 @@ def _with_parts(definitions: Definitions, checked: Iterable[Definition]) -> set[
 
 
 def _refuse(code: str, place: Place, complaints: Complaints) -> None:
+    """Report an `allow` of a code that is no warning of a run (D331)."""
     from ic.text.codes import is_on_the_page
 
     if is_on_the_page(code):

@@ -265,7 +265,7 @@ def _standing(scope: Scope, item: Item, arm: ResolvedArm) -> ResolvedArm:
 
 
 def _courses(scope: Scope, item: Item, body: MergedBlock) -> tuple[Course, ...]:
-    """The courses of the components that are written, in order; mistakes are reported."""
+    """The courses (values as functions of time) of a prescribed base's components, in order; mistakes are reported."""
     owner = Owner("a prescribed base", item.place, BASE)
     check_keys(scope, body, COMPONENTS, owner)
     if not any(name in body.items for name in COMPONENTS) and not body.items:
@@ -282,7 +282,8 @@ def _courses(scope: Scope, item: Item, body: MergedBlock) -> tuple[Course, ...]:
 
 
 def _course(scope: Scope, item: Item) -> str | None:
-    """The model of one component's course."""
+    """The command's model that moves one component of a prescribed base in time, its parameters entered in the scope;
+    None where it has a mistake, which is reported."""
     if item.value is None:
         scope.complaints.error(
             "D250",
@@ -352,7 +353,8 @@ def _check_jumps(scope: Scope, item: Item, model: str, place: Place) -> None:
 
 
 def _smooth() -> Iterable[str]:
-    """Courses that never jump, with the word for that where one has it."""
+    """Models of commands whose value and rate never jump, each with the parameter that makes it so where it needs one:
+    `NAME(KEY = WORD)`."""
     names = []
     for name, command in models.find_own("command").items():
         words = [(p.name, word) for p in command.parameters for word in p.words]

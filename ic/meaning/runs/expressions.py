@@ -178,6 +178,7 @@ class ChannelTable:
         return evaluate_number(expression, self._find)
 
     def _signal(self, name: str, value: Value, expression: Expression) -> SignalExpression:
+        """The signal of an expression of channels. Raises Problem D356 where no channel is in it."""
         signal = SignalExpression(
             name,
             units.text(value.dimension),
@@ -217,6 +218,7 @@ class ChannelTable:
         return self._no_channel(name)
 
     def _no_channel(self, name: Name) -> Value:
+        """Raise Problem D125 for a name of no channel; one without messages where the reason is reported already."""
         first = name.path[0].text
         if first in self.scope.failed_servos | self.scope.failed_parts or of_lost(self.scope, name, self.structure):
             raise Problem(())
@@ -246,6 +248,7 @@ class ChannelTable:
         raise Problem(error("D353", "a condition is needed here", place_of(expression), help=COMPARE))
 
     def _comparison(self, comparison: Binary, negated: bool) -> ConditionMargin:
+        """The margin of a comparison: by how much it holds, in the unit of its sides. negated: of its opposite"""
         left, right = (self._number(side) for side in (comparison.left, comparison.right))
         need_one_dimension(comparison, left, right)
         below = comparison.operator.startswith("<") != negated

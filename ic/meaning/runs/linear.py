@@ -180,7 +180,8 @@ def resolve_linear_metrics(
 def _metric(
     scope: Scope, item: Item, block: MergedBlock, structure: Structure, answers: Sequence[LinearUse]
 ) -> MetricUse | None:
-    """The metric of a figure."""
+    """The metric of a run that is a figure of one of its `linear` blocks, such as a phase margin; None where it has a
+    mistake, which is reported."""
     places = [input_signal.path for input_signal in input_signals(structure) if input_signal.is_output]
     figure = FIGURES[word_of(item.value) or ""]
     body = item.body or MergedBlock()

@@ -34,6 +34,8 @@ ANY_RATE = 1000  # Hz, where the deck's rate has a mistake
 
 
 def resolve_rates(scope: Scope, run: Owner, item: Item | None) -> dict[str, Rate]:
+    """The rates of a run by name, from its block `rates`; what is missing, unknown or no rate is reported (D115 to
+    D117)."""
     rates: dict[str, Rate] = {}
     if item is None:
         scope.complaints.missing(

@@ -98,6 +98,7 @@ def of_lost(scope: Scope, name: Name, structure: Structure) -> bool:
 
 
 def _names(scope: Scope, item: Item, expression: Expression | None) -> Iterator[Name]:
+    """The names of channels in a `record`, one by one; what is no name is reported (D124), and `none` has none."""
     if isinstance(expression, Name) and expression.text == "none":
         return
     items: Iterable[Expression] = expression.items if isinstance(expression, List) else ()

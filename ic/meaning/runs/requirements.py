@@ -270,6 +270,8 @@ def metrics_over_time(scope: Scope, block: MergedBlock) -> tuple[MergedBlock, Ma
     taken |= {statement.name.text for statement in block.statements if statement.name is not None}
 
     def metric_of(statement: Statement, call: Call) -> Name:
+        """The name of the metric that stands for a call in a requirement, such as `always(...)`; the metric is made at
+        its first use."""
         text = spell(call)
         name = statement.name.text if statement.name is not None else unnamed.get(text, "")
         if not name:

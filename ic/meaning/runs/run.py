@@ -177,6 +177,7 @@ def _keep_settings(
 
 
 def _check_entries(scope: Scope, block: MergedBlock, definition: Definition) -> None:
+    """Report entries and statements that a run does not have (D108 to D110), each with what may have been meant."""
     metrics = [item.name for kind in RUN.named if kind != WITH for item in block.of_kind(kind)]
     for item in block.items.values():
         if item.kind == WITH and (item.value is None or item.detail):
@@ -259,6 +260,8 @@ def _inside(block: MergedBlock, key: str) -> list[str]:
 
 
 def _arm(scope: Scope, run: Owner, item: Item | None) -> ResolvedArm | None:
+    """The arm that a run names, resolved; None where it names none or the arm has a mistake, which is reported
+    (D112)."""
     if item is None:
         known = known_words("arms of this deck", scope.definitions.of_kind("arm"))
         scope.complaints.missing(
@@ -291,6 +294,7 @@ def _integrator(scope: Scope, item: Item | None):  # type: ignore[no-untyped-def
 
 
 def _seed(scope: Scope, run: Owner, item: Item | None) -> int:
+    """The seed of a run's noise, 0 where it has none; a wrong one is reported (D113)."""
     number = scope.constant(run, SEED, item) if item is not None else 0.0
     scope.not_sweepable["seed"] = NotSweepable(
         "is one for the whole sweep", "`repeat 5;` runs each case with other noise"

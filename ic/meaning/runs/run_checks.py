@@ -85,6 +85,8 @@ def _all_is_sound(run: RunParts) -> bool:
 
 
 def _check_beginnings(run: RunParts) -> None:
+    """Check the initial state: balanced servos, joint ranges, rest where servos need it, and commands that begin
+    elsewhere."""
     initial = body_of(run.scope, run.block.get("initial"))
     check_balanced(run.scope, initial.get("servos"), run.uses, run.structure)
     remark_beginnings(run.scope, run.structure.moving, run.structure.environment)
@@ -95,6 +97,7 @@ def _check_beginnings(run: RunParts) -> None:
 
 
 def _check_beds(run: RunParts) -> None:
+    """Check the joints whose motors are on beds: their ticks, brakes, and failures that would not reach the drive."""
     substitutions, environment = run.structure.substitutions, run.structure.environment
     check_ticks(run.scope, substitutions, run.ticks, run.structure.schedule)
     check_brakes(run.scope, substitutions, environment)

@@ -53,7 +53,7 @@ class FlowAbreast(Flow):
 
     @classmethod
     def of(cls, flows: Sequence[Flow]) -> FlowAbreast:
-        """Flows of one program at one tick, side by side, without their tangents."""
+        """Carry flows (memories of cases) of one program at one tick side by side, without their tangents."""
         inputs, cells = _joined([flow.inputs for flow in flows]), _joined([flow.cells for flow in flows])
         return cls(flows[0].program, inputs, cells, flows[0].tick, len(flows))
 
@@ -63,7 +63,7 @@ class FlowAbreast(Flow):
         return Flow(self.program, inputs, cells, self.tick)
 
     def begin_settled(self) -> None:
-        """Start the run; a loop that repeats until it has settled stops at `SETTLED`."""
+        """Run the start of the program; a loop that repeats until it has settled stops at `SETTLED`."""
         self._settles = True
         self.begin()
         self._settles = False
@@ -75,7 +75,8 @@ class FlowAbreast(Flow):
         self.cells = dict(begun) | {name: column for name, column in self.cells.items() if np.ndim(column)}
 
     def run(self, number: int) -> None:
-        """Run one section for all cases."""
+        """Run one section of the program for all cases side by side, with tangents, and note the cases on its kinks.
+        number: of the section"""
         section, moves = self.program.sections[number], bool(self.tangents)
         with np.errstate(all="ignore"):
             value_of = values_abreast(section, self._leaf, self.opposite.get(self._runs, {}), plain=not moves)
@@ -120,6 +121,8 @@ class FlowAbreast(Flow):
         return np.broadcast_to(np.any(np.atleast_1d(move) != 0.0, axis=-1), (self.count,))
 
     def _loop(self, step: Branch) -> None:
+        """Follow a loop's body in all cases whose condition cell is not 0, until it is 0 in all or the loop's largest
+        number of turns is done. A case that enters a loop of an event is marked `unusual`."""
         condition: Any = step.condition
         outer = self._going
         for _ in range(condition.at_most):
@@ -148,7 +151,8 @@ class FlowAbreast(Flow):
 
 
 def together(flows: Sequence[Flow], go: Callable[[Flow], object]) -> list[Flow]:
-    """The flows, of one program at one tick, after an action that needs no tangents is done with them side by side."""
+    """The flows (memories of cases at one tick), after an action that needs no tangents was done on all of them side by
+    side."""
     flows_after = []
     for first in range(0, len(flows), MOST_ABREAST):
         moved = side_by_side(flows[first : first + MOST_ABREAST])
@@ -191,7 +195,8 @@ def _joined(several: Sequence[Mapping[str, float]]) -> dict[str, Any]:
 def values_abreast(
     section: TangentSection, leaf: Callable[[Node], Any], opposite: Mapping[int, np.ndarray], *, plain: bool
 ) -> Callable[[int], Any]:
-    """The value of each reference of a section, as from `met.trace.tangents.values`, where numbers may be columns."""
+    """The value of each reference of a section, as from `met.trace.tangents.values`, for cases side by side: numbers
+    may be columns [case, 1]."""
     nodes = section.nodes
     node_values: list[Any] = [None] * len(nodes)
     done: Mapping[int, list[int]] = {} if plain else section.last_uses  # tangents of many cases are large

@@ -277,6 +277,7 @@ class LinearQuestion:
         paths = [program.inputs[tick.entry].path for tick in period.ticks]
 
         def summed(columns: np.ndarray) -> np.ndarray:
+            """Columns of a matrix, [row, tick of an input], with those of each input added up."""
             own = [
                 columns[:, [k for k, path_of_tick in enumerate(paths) if path_of_tick == path]].sum(1)
                 for path in inputs
@@ -391,7 +392,7 @@ class LiftedPeriod:
         return bandwidth(ScalarLoop(self.A, B, self.C[0], D, self.map.seconds, self.drift))
 
     def opened(self, paths: tuple[str, ...]) -> OpenLoop:
-        """The loop opened at these signals: the map from the signals put in to those that come back."""
+        """The loop that is opened at these signals, from what is put in there to what comes back, with its margins."""
         ticks = [k for k, tick in enumerate(self.map.ticks) if self.program.inputs[tick.entry].path in paths]
         Wx, inverse, B = self.Wx[ticks], np.linalg.inv(self.Wu[np.ix_(ticks, ticks)]), self.B[:, ticks]
         A, b, c, d = self.A - B @ inverse @ Wx, B @ inverse, inverse @ Wx, np.eye(len(ticks)) - inverse
@@ -448,6 +449,7 @@ def _of_period(z: complex, shares: tuple[tuple[str, float], ...], seconds: float
 
 
 def _records(experiment: Experiment, outputs: Sequence[str]) -> tuple[Recorded, ...]:
+    """The variables of these names of outputs. Raises Problem D373 for an unknown one."""
     known = recordable(experiment.structure, outputs)
     for name in outputs:
         if name not in known:
@@ -458,6 +460,7 @@ def _records(experiment: Experiment, outputs: Sequence[str]) -> tuple[Recorded, 
 def _named(
     structure: Structure, every: Sequence[InputSignal], paths: Sequence[str], opened: Sequence[str]
 ) -> tuple[InputSignal, ...]:
+    """The signals of these paths. Raises Problem for one that is no input, or at which no loop can be opened."""
     known = {signal.path: signal for signal in every}
     laws = {path: signal for path, signal in known.items() if signal.is_output}
     for path in paths:
@@ -469,6 +472,7 @@ def _named(
 
 
 def _unknown(what: str, name: str, known: Mapping[str, object], why: Sequence[str] = ()) -> Problem:
+    """The error that there is no such input or output (D373), with names that may be meant."""
     near = nearest(name, known) if not why else None
     helps = [*why, *([f"did you mean `{near}`?"] if near else [])]
     if known and len(known) <= 12:
@@ -479,6 +483,7 @@ def _unknown(what: str, name: str, known: Mapping[str, object], why: Sequence[st
 
 
 def _too_long(program: PeriodProgram) -> Problem:
+    """The error for computers whose ticks meet too seldom for a linear answer (D374)."""
     experiment = program.experiment
     return Problem(
         error(
@@ -492,6 +497,7 @@ def _too_long(program: PeriodProgram) -> Problem:
 
 
 def _outside(experiment: Experiment, time: float) -> Problem:
+    """The error for a time that is not in the run (D372)."""
     duration = experiment.structure.schedule.duration
     return Problem(
         error(

@@ -119,7 +119,7 @@ class Flow:
         return self.tangents.get(name, 0.0)
 
     def run(self, number: int) -> None:
-        """Run one section."""
+        """Run one section of the program for this case, with tangents, and note its kinks. number: of the section"""
         section, moves = self.program.sections[number], bool(self.tangents)
         with np.errstate(all="ignore"):
             value_of = values(section, self._leaf, self.opposite.get(self._runs, frozenset()), plain=not moves)
@@ -156,6 +156,7 @@ class Flow:
         return tuple(node[1] for node in nodes if node[0] == "cell" and node[1] in self.tangents)
 
     def _leaf(self, node: Node) -> Any:
+        """The value of a cell, input, tick or time in this memory."""
         kind, *rest = node
         if kind == "cell":
             name = rest[0]
@@ -165,6 +166,7 @@ class Flow:
         return float(self.tick) if kind == "tick" else self.tick / self.program.schedule.base_hz
 
     def _follow(self, body: Iterable[RecordedControl]) -> None:
+        """Run the sections and branches of a body of the program for this case."""
         for step in body:
             if not isinstance(step, Branch):
                 if not isinstance(step, RecordSection) or self._recording:
@@ -179,6 +181,8 @@ class Flow:
                 self._loop(step)
 
     def _loop(self, step: Branch) -> None:
+        """Run a loop of the program until its condition cell is 0. Raises Problem where an event is on the way, at
+        which there is no derivative: a joint comes to rest, or a payload is handed over."""
         condition: Any = step.condition
         for _ in range(condition.at_most):
             if self.cells.get(condition.cell, 0.0) == 0.0:

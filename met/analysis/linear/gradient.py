@@ -237,6 +237,7 @@ def _limits(names: Iterable[str]) -> list[str]:
 
 
 def _words(output: str) -> str:
+    """An event that shows in an output of the program, in words."""
     if output == FAILURE[0]:
         return "the run fails"
     if ":" in output:

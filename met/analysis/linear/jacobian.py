@@ -168,6 +168,7 @@ def _side_by_side(flows: Sequence[Flow], states: tuple[str, ...], helds: Sequenc
 
 
 def _by_itself(program: PeriodProgram, flow: Flow) -> PeriodMap | Problem:
+    """The linearised period of a case alone, or the Problem in its place."""
     try:
         return period_map(program, flow)
     except Problem as refused:
@@ -185,8 +186,8 @@ class _Held:
 
 
 def _held(start: Flow, after: Flow) -> _Held:
-    """Find the states that are held where a period begins. after: its first ticks. Raises Problem where something
-    breaks away."""
+    """The states that friction, locked servos or standing shafts hold where a period begins. after: the flow behind its
+    first ticks. Raises Problem where something breaks away."""
     locked, rates = start.locked(), held_rates(start)
     held = (*(name for name, mode in after.modes().items() if mode == 0.0), *rates.values(), *locked)
     if going := after.breaking_away():
@@ -341,6 +342,7 @@ def _refuse_kinks(period: _Carried, carried: Any) -> None:
 
 
 def _all(edges: Sequence[Edge]) -> dict[int, frozenset[int]]:
+    """The nodes of all these kinks, by the number of the section's run in the period."""
     nodes_by_run: dict[int, frozenset[int]] = {}
     for edge in edges:
         nodes_by_run[edge.run] = nodes_by_run.get(edge.run, frozenset()) | frozenset(edge.nodes)

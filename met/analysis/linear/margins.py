@@ -212,7 +212,7 @@ def _where_real(loop: ScalarLoop) -> list[float]:
 
 
 def _where_size_is(loop: ScalarLoop, size: float) -> list[float]:
-    """Frequencies at which |L| has this value."""
+    """Frequencies, rad/s up to Nyquist's, at which the size of the loop |L| has this value."""
     C, D = loop.C[None, :], loop.D
     last = [[D * C, C, np.array([[D * D - size * size]])]]
     frequencies = _roots(loop, last, by_output=True)
@@ -257,8 +257,9 @@ def _refined(estimates: Sequence[float], zero: Callable[[float], float], nyquist
 
 
 def _disk(loop: ScalarLoop) -> tuple[float, float]:
-    """alpha = 1/max|S - 1/2| on the unit circle, S = 1/(1 + L), and where: levels are raised until none is above (N.
-    Bruinsma and M. Steinbuch, A fast algorithm to compute the H-inf norm of a transfer function matrix, 1990)."""
+    """The disk margin alpha = 1/max|S - 1/2| on the unit circle, S = 1/(1 + L), and the frequency of the maximum:
+    levels are raised until none is above (N. Bruinsma and M. Steinbuch, A fast algorithm to compute the H-inf norm of a
+    transfer function matrix, 1990)."""
     gain = 1.0 / (1.0 - loop.D)
     A, B = loop.closed(), gain * loop.B
     T = ScalarLoop(A, B, gain * loop.C, gain - 0.5, loop.period)  # S - 1/2, of P: S = 1/(1 - P)

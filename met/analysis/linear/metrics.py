@@ -81,7 +81,7 @@ def check(prepared: engine.Prepared) -> None:
 
 
 def _linear_uses(prepared: engine.Prepared) -> list[LinearUse]:
-    """The linear answers of which an experiment has metrics; none where it is driven on beds."""
+    """The linear answers of which an experiment has metrics; none where its cases are driven on motor beds."""
     named = {linear_metric.of for linear_metric in prepared.experiment.linear_metrics}
     return [use for use in prepared.experiment.linear if use.name in named and not prepared.wire]
 
@@ -136,8 +136,8 @@ def _figures(
     lifted: LiftedPeriod | Problem | int,
     flow: Flow | None,
 ) -> tuple[list[float], float]:
-    """The figures of a case, and the reasons why one or all are missing: `ANSWERED` where none is. lifted: its period,
-    or why it has none; flow: where it stands"""
+    """The linear metrics of one case, and the reason why one or all are missing: `ANSWERED` where none is. lifted: the
+    case's linearised period, or the reason why it has none; flow: its memory at the period's begin"""
     if not isinstance(lifted, LiftedPeriod) or flow is None:
         return [math.nan] * len(wanted), float(lifted if isinstance(lifted, int) else EVENT)
     loops = (

@@ -48,6 +48,7 @@ class InjectedBuilder(Builder):
         return replace(setpoint, value=setpoint.value + tape.read(ADDED + path)) if path in self._added else setpoint
 
     def compute(self, tape: Tape, actuator: Actuator, seen: Seen) -> None:
+        """Compute a servo's outputs, and add to them what is put in at the opened places."""
         super().compute(tape, actuator, seen)
         for output in actuator.parts.outputs:
             path = f"{actuator.path}.{output.name}"
@@ -106,8 +107,8 @@ class PeriodProgram:
         return math.lcm(self.schedule.dynamics, *divisors)
 
     def begin(self, time: float) -> int:
-        """The tick of the last start of a period up to a time, s. Tick 0 is excluded where a bed is not under way
-        yet."""
+        """The tick of the last start of a period up to a time, s. Tick 0 is excluded where the program leaves something
+        out at it, as with a motor on a bed."""
         tick = math.floor(time * self.schedule.base_hz * (1.0 + 1e-12)) // self.ticks * self.ticks
         waits = any(isinstance(step, Branch) and isinstance(step.condition, Unless0) for step in self.rest)
         return self.ticks if waits and tick == 0 else tick

@@ -59,8 +59,9 @@ MOVES = 1e-9
 
 
 def plants(program: PeriodProgram, flows: Sequence[Flow], case_states: Sequence[Sequence[str]]) -> list[PlantModel]:
-    """The plant where each of these flows stands, before its computers tick there. case_states: the states of each, of
-    which those of the arm are used"""
+    """The arm's plant without its computers, dx/dt = A x + B u, where each of these flows (memories of cases at an
+    instant) stands, before its computers tick there. case_states: the states of each; only those of the arm are
+    used."""
     step, by_place = program.builder.step, dict[int, PlantModel]()
     arm = {*program.positions, *program.rates, *step.states}
     own = [tuple(name for name in names if name in arm) for names in case_states]

@@ -40,14 +40,15 @@ def bring_to_rest(flow: Flow) -> None:
 
 
 def shaft_rates(flow: Flow) -> dict[str, Any]:
-    """Rates of the shafts of beds, rad/s, by joint; of a `FlowAbreast`, [case, 1] or a number each."""
+    """Rates of the shafts on which motors of joints are tested (their beds), rad/s, by joint; of a `FlowAbreast`,
+    [case, 1] or a number each."""
     joints = [actuator.use.joint for actuator, _, _ in flow.program.system.mounted]
     cells = {joint: f"{joint}.bed.shaft_rate" for joint in joints}
     return {joint: flow.cells[cell] for joint, cell in cells.items() if cell in flow.cells}
 
 
 def loose_beds(flow: Flow) -> list[str]:
-    """Joints whose bed's shaft stands where a period begins, and does for all of it, though nothing holds it there."""
+    """Joints on motor beds whose shaft stands still for a whole period, though nothing holds it there."""
     rates = {joint: f"{joint}.bed.shaft_rate" for joint in shaft_rates(flow)}
     return [joint for joint, cell in rates.items() if _goes_to_0(flow, cell, 0.0) and not _is_held(flow, cell)]
 

@@ -173,8 +173,8 @@ def _commanded(program: PeriodProgram, flow: Flow) -> Flow:
 
 
 def _under_way(program: PeriodProgram, flows: Sequence[Flow]) -> list[Flow]:
-    """The flows with beds under way: amplifiers and queues hold what laws ask for at that point. All else stays as at
-    the run's start."""
+    """The flows (memories of cases) with their motor beds under way: amplifiers and queues hold what laws ask for at
+    that point. All else stays as at the start."""
     copies = [flow.copy(tangents=False) for flow in flows]
     heads = tuple(f"{actuator.use.joint}{part}" for actuator, _, _ in program.system.mounted for part in HOLD)
     rates = {
@@ -187,7 +187,7 @@ def _under_way(program: PeriodProgram, flows: Sequence[Flow]) -> list[Flow]:
 
 
 def _places(program: PeriodProgram) -> tuple[str, ...]:
-    """Cells of the positions of joints and of shafts of beds."""
+    """Cells of the positions of joints, and of the shafts of motor beds."""
     return (
         *program.positions,
         *(cells.SHAFT_ANGLE(actuator.use.joint) for actuator, _, _ in program.system.mounted),
@@ -195,7 +195,7 @@ def _places(program: PeriodProgram) -> tuple[str, ...]:
 
 
 def _faults(program: PeriodProgram) -> Iterator[str]:
-    """The faults that beds have, as paths."""
+    """Paths of the faults of motor beds that are not 0 in this experiment."""
     for actuator, bed, _ in program.system.mounted:
         for name in dict.fromkeys(name for preset in bed.presets.values() for name in preset):
             path = f"{actuator.use.joint}.bed.{name}"

@@ -93,6 +93,7 @@ class _CEmitter:
         self.timed = any(section.nodes[i][0] == "time" for section in recording.sections for i in section.order)
 
     def source(self) -> CSource:
+        """The whole C text of the program, with the names of its inputs, outputs and cells."""
         sections = [self._section(n, section) for n, section in enumerate(self.recording.sections)]
         entries = [self._start(), self._tick(), self._end()]
         tables = [
@@ -103,6 +104,7 @@ class _CEmitter:
         return CSource("\n".join(part for part in parts if part), self.inputs, self.outputs, self.cells)
 
     def _memory(self) -> str:
+        """The C struct of a case: inputs, cells, outputs and the row."""
         members = [*self.inputs.values(), *self.cells.values(), *self.outputs.values()]
         if self.program.columns:
             members.append(f"row[{self.program.columns}]")
@@ -130,6 +132,8 @@ class _CEmitter:
         return [f"    met->tick = {tick};", *time]
 
     def _steps(self, body: Sequence[RecordedControl], depth: int) -> Iterator[str]:
+        """The C lines of a phase's steps: calls of sections, rows that are recorded at their ticks, and branches,
+        `depth` deep."""
         pad = "    " * depth
         for node in body:
             match node:
@@ -151,6 +155,7 @@ class _CEmitter:
     # One straight piece
 
     def _section(self, number: int, section: CodeSection) -> str:
+        """The C function of a section: a constant for each node, then the stores to cells, row and outputs."""
         nodes = section.nodes
         lines: list[str] = []
         drawn: dict[tuple[int, ...], str] = {}

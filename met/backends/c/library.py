@@ -58,6 +58,8 @@ class Library:
         threads: int | None = None,
         progress: Callable[[int], None] | None = None,
     ) -> tuple[np.ndarray | None, np.ndarray]:
+        """Run cases one after another, as `Kernel.run` of met.backends.backend: inputs [case, input] to rows [case,
+        row, column] and outputs [case, output]."""
         program = self.program
         inputs = checked_inputs(program, inputs)
         rows = np.empty((len(inputs), ticks // program.record_divisor + 1, program.columns)) if record else None
@@ -100,6 +102,7 @@ class CBlock:
         self.recorded(first, last)
 
     def recorded(self, first: int, last: int) -> np.ndarray:
+        """Run the ticks from `first` to `last` of the one case: rows [1, row, column]. Tick 0 begins anew."""
         rows = []
         self._called.met_give(self._case, self.inputs.ctypes.data_as(ctypes.c_void_p))
         if first == 0:

@@ -67,6 +67,7 @@ class _Numbers(dict[str, str]):
         self.locals: dict[str, str] = {}
 
     def __missing__(self, name: str) -> str:
+        """The short name of a symbol, local or label that is met for the first time."""
         if name.startswith(_KEPT):
             number = name
         elif name[0] == "@":
@@ -87,6 +88,7 @@ def numbered(text: str) -> str:
     symbols: dict[str, str] = {}
 
     def of(part: str) -> str:
+        """A function's IR with its names replaced by numbers; a section has numbers already."""
         if part.startswith("private void @section."):
             return _REMARK.sub("", part)
         names = _Numbers(symbols)
@@ -106,6 +108,8 @@ class _LlvmEmitter:
     def __init__(
         self, recording: Recording, lanes: int, vector: int, width: int, inline: bool, sizes: tuple[int, int, int]
     ) -> None:
+        """lanes: cases a block; vector: cases that one value of the code holds; width: doubles of a register; inline,
+        sizes: as of `emit` and `cut`"""
         self.recording = recording
         self.lanes = lanes
         self.count = vector
@@ -123,6 +127,7 @@ class _LlvmEmitter:
         self.scratch = 0
 
     def text(self) -> str:
+        """The IR text of the module: tables, a function for each piece of a section, and the entry that calls them."""
         for n, section in enumerate(self.recording.sections):
             pieces = cut(section, *self.sizes)
             if check.wanted():
@@ -159,6 +164,8 @@ class _LlvmEmitter:
     # One straight piece
 
     def _function(self, symbol: str, section: CodeSection, piece: Piece) -> str:
+        """The IR text of the function of one piece of a section. Values that other pieces need pass through the scratch
+        memory."""
         nodes = section.nodes
         lines: list[str] = []
         put = lines.append
@@ -230,6 +237,7 @@ class _LlvmEmitter:
             return op(f"bitcast {V} {value} to {bits}")
 
         def computed(node: Node) -> str:
+            """Write the instructions of an operation; returns the name of its result."""
             kind = node[0]
             operands = [of(ref) for ref in node[1 : 1 + OPERANDS[kind]]]
             if kind in _ARITHMETIC:
@@ -276,6 +284,8 @@ class _LlvmEmitter:
             return gathered(operands[0], node[2])
 
         def gathered(index: str, table: tuple[float, ...]) -> str:
+            """Write the look-up of a table of constants at a floating index, held within the table; not-a-number where
+            the index is."""
             symbol = self.tables.setdefault(table, f"@table.{len(self.tables)}")
             top = number(len(table) - 1.0)
             above = op(f"fcmp ogt {V} {index}, zeroinitializer")
@@ -290,6 +300,8 @@ class _LlvmEmitter:
             return op(f"select {truth} {nan}, {V} splat (double {number(float('nan'))}), {V} {inside}")
 
         def keep(i: int) -> None:
+            """Write the store of a value that later pieces need, into its slot of the scratch memory; truths as 0 and
+            1."""
             value = have[i]
             if nodes[i][0] in TRUTHS:
                 value = op(f"select {truth} {value}, {V} splat (double {number(1.0)}), {V} zeroinitializer")
@@ -297,6 +309,7 @@ class _LlvmEmitter:
             put(f"  store {V} {value}, ptr {place}, align {self.align}")
 
         def leave(stores: Iterable[tuple[str, Any, int]]) -> None:
+            """Write the stores to cells, row and outputs, after all of their values are there."""
             ready = [(kind, where, of(ref)) for kind, where, ref in stores]
             for kind, where, value in ready:
                 base, i = {

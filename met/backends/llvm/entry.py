@@ -35,6 +35,8 @@ class _Entry:
     def __init__(
         self, recording: Recording, calls: Sequence[Sequence[str]], lanes: int, vector: int, scratch: int
     ) -> None:
+        """lanes: cases a block; vector: cases that a call of a section computes; scratch: doubles of memory that pieces
+        share, a case"""
         self.recording = recording
         self.program = recording.program
         self.calls = calls
@@ -60,12 +62,15 @@ class _Entry:
         return f"{word}.{self.labels}"
 
     def guarded(self, condition: str, word: str, body: Callable[[], None]) -> None:
+        """Write a body that runs only where a condition (a name of IR) holds."""
         inside, after = self.label(word), self.label("after")
         self.put(f"  br i1 {condition}, label %{inside}, label %{after}", f"{inside}:")
         body()
         self.put(f"  br label %{after}", f"{after}:")
 
     def call(self, section: int, row: str = "null") -> None:
+        """Write the calls of a section's pieces, for each part of the lanes. row: the pointer to where a recorded row
+        goes."""
         _, tick, time = self.now
         rows = [row] * len(self.parts)
         if row != "null":
@@ -87,6 +92,7 @@ class _Entry:
         return f"%{n}"
 
     def steps(self, body: Iterable[RecordedControl]) -> None:
+        """Write a body of the program's control: sections, rows and branches."""
         for node in body:
             match node:
                 case RunSection(section):
@@ -103,6 +109,7 @@ class _Entry:
                     self.while_any(condition, inner)
 
     def while_any(self, condition: WhileAny, body: tuple[RecordedControl, ...]) -> None:
+        """Write the loop of a body that runs while the condition's cell is not 0 in any lane, `at_most` times."""
         n = self.label("w")
         vector = f"<{self.lanes} x double>"
         self.counters.append(f"  %{n}.p = alloca i64")
@@ -129,11 +136,14 @@ class _Entry:
         self.put(f"  br label %ask.{n}", f"after.{n}:")
 
     def record(self, node: RecordSection) -> None:
+        """Write the recording of a row at its ticks, into a tile (rows of all lanes side by side) that is flushed when
+        it is full."""
         n = self.label("row")
         due = self.due(node.divisor)
         self.put(f"  %{n} = and i1 {due}, %recording")
 
         def body() -> None:
+            """Write the call of the section, whose row goes into the tile behind those that are there."""
             self.put(
                 f"  %{n}.filled = load i64, ptr %filled",
                 f"  %{n}.offset = mul i64 %{n}.filled, {self.row_bytes}",
@@ -149,6 +159,7 @@ class _Entry:
         self.put(f"  %row = and i1 {due}, %recording")
 
         def body() -> None:
+            """Count the row, and flush the tile where it is full."""
             self.put(
                 "  %row.filled = load i64, ptr %filled",
                 "  %row.more = add i64 %row.filled, 1",
@@ -160,6 +171,8 @@ class _Entry:
         self.guarded("%row", "recorded", body)
 
     def flush(self, count: str) -> None:
+        """Write the copying of the tile's rows, which are of all lanes side by side, into the rows of each case. count:
+        the doubles of a lane in it"""
         n = self.label("flush")
         self.put(
             f"  %{n}.to = load ptr, ptr %target",
@@ -171,6 +184,8 @@ class _Entry:
         )
 
     def text(self) -> str:
+        """The IR text of the entry: for each block, the start if the first tick is 0, all ticks with their rows, and
+        the end if outputs are asked for."""
         base_hz = number(self.program.base_hz)
         slots = (("inputs", len(self.program.inputs)), ("outputs", len(self.program.outputs)))
         self.put("  br label %block", "block:", "  %b = phi i64 [ 0, %entry ], [ %b.next, %block.end ]")
@@ -278,6 +293,7 @@ class _Entry:
         ], ["  call void @free(ptr %work)"]
 
     def _start(self) -> None:
+        """Write what happens before tick 0: all cells 0, then the program's start."""
         if self.state:
             self.put(
                 "  call void @llvm.memset.p0.i64(ptr align 64 %state.b, i8 0, "
@@ -287,7 +303,7 @@ class _Entry:
 
 
 def entry(recording: Recording, calls: Sequence[Sequence[str]], lanes: int, vector: int, scratch: int) -> str:
-    """The entry function.
+    """The IR text of the function that runs a program: blocks, ticks, control and rows.
 
     calls    symbols of each section's pieces, which take `vector` of a block's lanes
     scratch  slots that pieces share

@@ -91,6 +91,7 @@ def written(
 
 
 def _refuse_or_warn(machine: Machine) -> None:
+    """Raise Problem E210 on a processor without fused multiply-add; with MET_ALLOW_NO_FMA=1 warn that it is slow."""
     if os.environ.get("MET_ALLOW_NO_FMA") != "1":
         raise Problem(
             error(
@@ -190,6 +191,7 @@ class LlvmKernel:
                 progress(done)
 
         def work(start: int, between: Callable[[], None] = lambda: None) -> int:
+            """Run the chunk of cases from `start` on in this thread; returns their number."""
             stop = min(start + chunk, cases)
             own_rows = None if rows is None else rows[start:stop]
             self._run_chunk(inputs[start:stop], ticks, own_rows, outputs[start:stop], ended, between)
@@ -269,6 +271,8 @@ class LlvmBlock:
     """
 
     def __init__(self, kernel: LlvmKernel, inputs: np.ndarray | Sequence[Sequence[float]]) -> None:
+        """inputs: [case, input], as many cases as the kernel has lanes, or fewer. Raises ValueError for another
+        shape."""
         case_inputs = np.atleast_2d(np.asarray(inputs, dtype=np.float64))
         program = kernel.program
         if not 1 <= len(case_inputs) <= kernel.lanes or case_inputs.shape[1] != len(program.inputs):

@@ -77,6 +77,7 @@ def wasm32() -> Machine:
 
 
 def _target_machine(target: Machine, level: int | None = None) -> Any:
+    """LLVM's machine for this target. level: of optimisation; None: the usual."""
     _ready()
     if target.triple:
         _ready_for_all()
@@ -116,6 +117,8 @@ def listing(text: str, target: Machine, *, level: int | None = None) -> str:
 
 
 def _prepared(text: str, machine_: Any, level: int | None) -> Any:
+    """The module of an IR text, optimised for a machine. level: of optimisation; None or QUICK: only what must be
+    inlined is."""
     module = llvm.parse_assembly(text)
     if check.wanted():
         module.verify()

@@ -50,7 +50,8 @@ def operations(section: CodeSection) -> list[int]:
 
 
 def cut(section: CodeSection, above: int = CUT_ABOVE, shortest: int = SHORTEST, longest: int = LONGEST) -> list[Piece]:
-    """The section's pieces, at least one."""
+    """The section cut into pieces of `shortest` to `longest` operations, each to be one function; a single piece if it
+    has no more than `above`."""
     nodes = section.nodes
     body = operations(section)
     number = {i: n for n, i in enumerate(body)}

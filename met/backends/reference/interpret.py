@@ -39,6 +39,8 @@ class Interpreter:
         threads: int | None = None,
         progress: Callable[[int], None] | None = None,
     ) -> tuple[np.ndarray | None, np.ndarray]:
+        """Run all cases side by side, as `Kernel.run` of met.backends.backend: inputs [case, input] to rows [case, row,
+        column] and outputs [case, output]. threads is not used."""
         program = self.program
         inputs = checked_inputs(program, inputs)
         block = InterpretedBlock(self.recording, inputs)
@@ -69,6 +71,7 @@ class InterpretedBlock:
         self.recorded(first, last)
 
     def recorded(self, first: int, last: int) -> np.ndarray:
+        """Run the ticks from `first` to `last`: rows [case, row, column]. Tick 0 begins with all memory 0."""
         program = self.recording.program
         divisor = program.record_divisor
         ticks = [k for k in range(first, last + 1) if k % divisor == 0]
@@ -107,10 +110,12 @@ class InterpretedBlock:
                     self._follow(step.body)
 
     def _section(self, number: int) -> None:
+        """Compute a section for all cases of the block, and write its cells, outputs and columns of the row."""
         section = self.recording.sections[number]
         count = self.inputs.shape[1]
 
         def leaf(node: Node) -> np.ndarray:
+            """The values of a cell, input, tick or time in all cases, [case]."""
             if node[0] == "cell":
                 return self.state[self._cell[node[1]]]
             if node[0] == "input":

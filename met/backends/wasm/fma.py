@@ -78,6 +78,7 @@ class _FmaWriter:
         return self.op(f"select {_T} {truth}, {kind} {a}, {kind} {b}")
 
     def clamped(self, x: str, least: int, most: int) -> str:
+        """A whole number held between two bounds, as IR."""
         low = self.op(f"icmp slt {_B} {x}, {_whole(least)}")
         x = self.where(low, _whole(least), x, _B)
         high = self.op(f"icmp sgt {_B} {x}, {_whole(most)}")

@@ -116,6 +116,8 @@ class _ObjectFile:
     """The parts of an object file."""
 
     def __init__(self, data: bytes) -> None:
+        """Read an object file of LLVM's. Raises ValueError where it imports functions, or globals but the stack's
+        pointer."""
         read = _ByteReader(data, 8)
         self.sections: dict[int, bytes] = {}
         self.symbols: list[_ObjectSymbol] = []
@@ -143,6 +145,7 @@ class _ObjectFile:
         return _Relocation(kind, offset, index, read.signed() if kind in _WITH_ADDEND else 0)
 
     def _linking(self, read: _ByteReader) -> None:
+        """Read the symbols and the alignments of data from the section `linking`."""
         read.number()  # version
         while read.position < len(read.data):
             kind = read.byte()
@@ -156,6 +159,7 @@ class _ObjectFile:
                     part.number()  # flags
 
     def _symbol(self, read: _ByteReader) -> _ObjectSymbol:
+        """Read one symbol. Raises ValueError for data that the object lacks."""
         kind, flags = read.byte(), read.number()
         if kind == _OF_DATA:
             name = read.name()

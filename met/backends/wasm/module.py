@@ -98,8 +98,8 @@ _VECTOR = "<2 x double>"
 
 
 def _memory(attributes: str) -> str:
-    """`malloc` and `free` for the one block of memory that an entry may ask for, always of the same size: memory grows
-    once, and the block is kept."""
+    """The functions `malloc` and `free`, for the one block of memory that an entry may ask for, always of the same
+    size: memory grows once, and the block is kept."""
     return f"""\
 @work = private global ptr null
 define private ptr @malloc(i64 %bytes) {attributes} {{
@@ -274,6 +274,8 @@ class WasmKernel:
         threads: int | None = None,
         progress: Callable[[int], None] | None = None,
     ) -> tuple[np.ndarray | None, np.ndarray]:
+        """Run cases in node, as `Kernel.run` of met.backends.backend: inputs [case, input] to rows [case, row, column]
+        and outputs [case, output]. threads is not used."""
         program = self.program
         inputs = checked_inputs(program, inputs)
         rows = np.empty((len(inputs), _rows(program, 0, ticks), program.columns)) if record else None

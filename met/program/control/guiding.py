@@ -45,7 +45,7 @@ def ticking(system: System) -> Iterator[GuideUse]:
 
 
 def start(system: System, tape: Tape) -> None:
-    """Write the start of guides: their joints' positions, rates of 0, and the guided frames where paths begin."""
+    """Write the start of guides: the joints' positions, rates of 0, and the guided frames from which paths count."""
     for use in ticking(system):
         tape.write(cells.GUIDE_TIME(use.name), 0.0)
         for joint in use.joints:
@@ -128,6 +128,8 @@ class _ArmAt:
         return Stance(self._R, self._p, w, v)
 
     def columns(self, *, answers: bool) -> Sequence[tuple[Vector, Vector]]:
+        """For each joint of the guide, angular and linear velocity of the guided frame for each unit of its rate, world
+        axes. answers: with a free base's reaction"""
         moves = [self._moves[i] for i in self._own]
         if not (self._free and answers):
             return moves
@@ -155,7 +157,8 @@ def _begun(use: GuideUse) -> list[str]:
 
 
 def _wanted(system: System, tape: Tape, use: GuideUse) -> Stance:
-    """The path at this time: its courses, counted from the initial guided frame."""
+    """Where the guide's path is at the present time and how it moves, counted from the initial guided frame; pose and
+    velocity in the world."""
     begun = [tape.read(name) for name in _begun(use)]
     R: Matrix = tuple(tuple(begun[i : i + 3]) for i in (0, 3, 6))  # type: ignore[assignment]
     values, rates = values_and_rates(
@@ -185,7 +188,7 @@ def setpoint(system: System, actuator: Actuator, read: ReadCell, time: Real) -> 
 
 
 def course_values(system: System, actuator: Actuator, read: ReadCell) -> NamedValues:
-    """The parameters of the course of a servo's own command."""
+    """The parameters of the command that a servo has of its own, by name."""
     assert actuator.profile is not None
     return parameters(
         f"command `{actuator.profile.name}` of {actuator.owner}",
@@ -201,7 +204,7 @@ def owner(use: GuideUse) -> str:
 
 
 def own(system: System, use: GuideUse, read: ReadCell) -> tuple[NamedValues, list[NamedValues]]:
-    """The guide's parameters, and those of each of its joints."""
+    """The parameters of a guide, and those of each of its joints."""
     guide = models.find("guide", use.model, use.place)
 
     def values(head: str, declared: Iterable[Parameter]) -> NamedValues:

@@ -78,6 +78,7 @@ class Aboard(ArmWorld):
         return sub(own, motion.to_link(falling))
 
     def spin(self, link: str) -> Vector:
+        """The angular velocity of a link in its axes, rad/s, including that of a turning world."""
         motion = self.link(link)
         w = motion.w
         for name, model in self._system.environment:
@@ -103,6 +104,8 @@ class Aboard(ArmWorld):
         return link_acceleration(self._tree, self._q, self._qd, moved.qdd[:n], link, self._base.w, moved.base)
 
     def _of_payload(self, name: str, moved: Accelerations) -> tuple[Vector, Vector]:
+        """Angular and linear acceleration of a payload, in its frame, rad/s^2 and m/s^2: its link's while it is
+        carried, else its own."""
         payload, read = self._flying[name], self._read
         body = bodies.free_body(self._system, payload)
         own = body.qdd(moved.qdd)
@@ -118,6 +121,8 @@ class Aboard(ArmWorld):
         return wd, a
 
     def _known(self, link: str) -> Accelerations:
+        """The accelerations at this instant. Raises Problem E216 where a sensor asks for them at its tick, before they
+        are known."""
         if self._moved is None:
             message = f"a sensor asks at its tick for an acceleration, of link `{link}`, which is not known yet"
             help = "keep what a circuit makes of it: a state, whose slope `follow` gives"

@@ -164,7 +164,8 @@ class StepTimes:
 
 
 def coupled(system: System, actuator: Actuator, read: ReadCell, begin: Real) -> Real | None:
-    """The servo's hold on its joint, 0 to 1, in the step that began then; None where nothing ever lets it go."""
+    """The share from 0 to 1 with which the servo holds its joint in the step that began then; None where nothing ever
+    lets it go."""
     held: Real | None = None
     step = StepTimes(begin, system.structure.schedule.step)
     for owner, model, p in _about(system, actuator, read):

@@ -96,7 +96,7 @@ class Substituted:
 
     @property
     def wire_outputs(self) -> dict[str, str]:
-        """Names of the outputs that go over the wires, by the cells that hold them."""
+        """Names of the outputs that go over the wires to real motor beds, by the cells that hold them."""
         return (
             {
                 f"wire:{joint.joint}.{name}": cells.SENT(joint.joint, name)
@@ -148,7 +148,7 @@ class Substituted:
     # The run's start.
 
     def start(self, tape: Tape) -> None:
-        """Start each shaft turning with its joint, as if for long; the observer knows that, and nothing else."""
+        """Start each bed's shaft turning with its joint, as if for long; the observer knows that, and nothing else."""
         tape.write("always", 1.0)
         for joint in self.mounted:
             motor = self.motor(tape, joint)
@@ -169,7 +169,7 @@ class Substituted:
                     tape.write(cells.COVARIANCE(joint.joint, i, j), _UNKNOWN[i] if i == j else 0.0)
 
     def begin_bed(self, tape: Tape, joint: Mounted, w: Real) -> None:
-        """Start the emulated bed of a shaft, its own, which has turned at w rad/s for long."""
+        """Start the emulated bed of a joint's motor; its shaft has turned at w rad/s for long."""
         begun = answer(self._owner(joint), joint.bed.begin, self._bed_values(tape, joint), w)
         returned(self._owner(joint), "begin", begun, (memory.name for memory in joint.bed.memory))
         for name, value in begun.items():
@@ -193,7 +193,7 @@ class Substituted:
     # A tick.
 
     def advance(self, tape: Tape) -> None:
-        """Advance the emulated beds from the last tick to this one."""
+        """Advance the emulated motor beds from the last tick to this one."""
         tick = tape.tick / float(self.divisor) - 1.0
         cases = self.system.experiment.cases
         seed = tape.input(SEED) if SEED in cases.noise else float(cases.seed)
@@ -202,7 +202,7 @@ class Substituted:
             self.advance_bed(tape, joint, self.period, seed=seed, repeat=repeat, tick=tick)
 
     def advance_bed(self, tape: Tape, joint: Mounted, period: float, *, seed: Real, repeat: Real, tick: Real) -> None:
-        """Advance one emulated bed by period s with its amplifiers' held outputs; its noise is that of the number
+        """Advance one emulated motor bed by period s under its amplifiers' outputs, with the noise of tick number
         `tick`."""
         p = self._bed_values(tape, joint)
         held = (f"drive_{joint.bed.drive}", "load_current")
@@ -352,7 +352,7 @@ class Substituted:
         return _Ahead(x[0], integral)
 
     def _queued(self, tape: Tape, joint: Mounted, ago: Real) -> Wire:
-        """The pair that was commanded this many ticks ago, from 1 to `QUEUE`."""
+        """The pair of drive and load commands that was sent this many ticks ago, from 1 to `QUEUE`."""
         commanded: Real = 0.0
         current: Real = 0.0
         for i in range(QUEUE):
@@ -402,8 +402,7 @@ class Substituted:
     def _on_bed(
         self, tape: Tape, joint: Mounted, command: Real | None, ahead: _Ahead, motion: balance.Balanced | None
     ) -> balance.Balanced | None:
-        """The joint's motion, with the torque that the bed's motor is commanded for the coming tick in place of its
-        own."""
+        """The joint's motion, with the torque that the bed's motor is commanded next in place of its own."""
         if motion is None or command is None or joint.closes_rate_loop:
             return motion
         net = motion.net - self._own_torque(tape, joint, ahead.w) + command
@@ -483,6 +482,7 @@ class Substituted:
         )
 
     def _law_input(self, tape: Tape, joint: Mounted, motion: balance.Balanced | None, ahead: _Ahead) -> LawInput:
+        """The inputs of a joint's law at this tick. motion: None where the law takes no balance."""
         motor, inertia, name = self.motor(tape, joint), self._shaft_inertia(tape, joint), joint.joint
         mean = joint.law.balance == "full"
         extra: Real = 0.0

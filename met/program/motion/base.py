@@ -73,7 +73,7 @@ def motions(tree: Tree, q: Sequence[Real], qd: Sequence[Real], base: BaseMotion)
 
 
 def prescribed(system: System, read: ReadCell, time: Real) -> BaseMotion:
-    """The motion of the base from its courses at a time (`courses`)."""
+    """Pose and velocity of a prescribed base at a time (s), from the formulas of its components."""
     varying = {path: read(PARAMETER + path) for path in system.courses.inputs if path != TIME}
     numbers = system.courses.replay({TIME: time, **varying})
     settled_numbers = [settled(x) if isinstance(x, Scalar) else np.float64(x) for x in numbers]
@@ -162,6 +162,7 @@ class ArmWorld:
         return link == WORLD and link not in self.links
 
     def link(self, link: str) -> LinkMotion:
+        """The motion of a link, payload or the ground in the world."""
         if self.is_ground(link):
             return LinkMotion(HERE, ZERO, ZERO)
         if self._motions is None:
@@ -171,12 +172,14 @@ class ArmWorld:
         return self._motions[self._own(link)]
 
     def _own(self, link: str) -> str:
+        """The name of a link that the arm has. Raises Problem E218 for another."""
         if link not in self.links:
             message = f"an environment model asks for link `{link}`, which the arm does not have"
             raise Problem(error("E218", message, help=f"links: {', '.join(self.links)}"))
         return link
 
     def _number(self, joint: str) -> int:
+        """The number of a moving joint. Raises Problem E218 where the arm does not have it."""
         if joint not in self._names:
             message = f"an environment model asks for joint `{joint}`, which the arm does not have"
             raise Problem(error("E218", message, help=f"moving joints: {', '.join(self.joints)}"))

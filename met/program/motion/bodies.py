@@ -201,7 +201,8 @@ def _turned(q: Quaternion, theta: tuple[Real, ...]) -> Quaternion:
 
 
 def _half_turn(theta: tuple[Real, ...]) -> tuple[Real, Real, Real]:
-    """phi^2, phi/2 (1 where phi is 0, so that it may divide) and its sine."""
+    """Three numbers of a rotation vector of length phi: phi^2, phi/2 (1 where phi is 0, so that it may divide), and the
+    sine of the second."""
     x, y, z = theta
     size = x * x + y * y + z * z
     half = where(size == 0.0, 1.0, 0.5 * sqrt(size))
@@ -271,7 +272,7 @@ def payload_motion(
 
 
 def flying_motion(system: System, payload: Payload, read: ReadCell, y: Motion) -> LinkMotion:
-    """A payload that flies, in the world."""
+    """Pose and velocity of a payload in free flight, which no link carries at present."""
     flying = flight(free_body(system, payload), read, y)
     return LinkMotion(flying.pose, flying.w, flying.v)
 
@@ -283,7 +284,7 @@ def carried_motion(payload: Payload, read: ReadCell, links: Mapping[str, LinkMot
 
 
 def split_wrenches(system: System, read: ReadCell, wrenches: Mapping[str, Wrench]) -> tuple[dict[str, Wrench], ...]:
-    """Wrenches on links, including those on payloads that a link carries; and wrenches on flying payloads.
+    """Wrenches on links, including those on payloads that a link carries; and wrenches on payloads that move freely.
 
     wrenches on links and payloads by name, about their frames' origins and in their axes
     """
