@@ -185,7 +185,7 @@ def test_a_case_that_was_lost_misses_every_requirement(plan: Plan, here: Path) -
         for task in (tasks.Task(0, 0, 20), tasks.Task(0, 20, 80), *(tasks.Task(0, k, k + 1) for k in range(lost))):
             there = folder.shards / task.name
             if task.cases == 1:
-                tasks.shard.write(there, tasks.not_run(section, task, LOST, "its worker died, 3 times"))
+                tasks.write_shard(there, tasks.not_run(section, task, LOST, "its worker died, 3 times"))
             else:
                 tasks.carry_out(section, task, folder.shards)
         if lost:
