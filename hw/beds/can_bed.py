@@ -35,7 +35,7 @@ from hw.drives.side import Side, agree
 from hw.ports import Opening, PortKind
 from hw.protocol import messages
 from met.diagnostic import Diagnostic, Problem, did_you_mean, error
-from met.substitution import observer
+from met.substitution import butterworth
 from met.substitution.bed import DRIVES, DriveCommand
 
 LONGEST_SHARE = 0.8
@@ -460,8 +460,8 @@ class CanBed(BedDriver):
             motor_side.follow(reading)
         cut, passed = self._bench.shaft["filter"], side.time - time
         if cut and passed > 0.0:
-            filter = observer.over(cut, passed)
-            y, slope = observer.along_line(filter, self._filtered, before, side.rate)
+            filter = butterworth.over(cut, passed)
+            y, slope = butterworth.along_line(filter, self._filtered, before, side.rate)
             self._filtered = float(y), float(slope)
         elif not cut:
             self._filtered = side.rate, 0.0

@@ -18,7 +18,7 @@ from hw.identify.series import Series
 from met import backends
 from met.backends.backend import Kernel
 from met.servos.motor import damping, torque
-from met.substitution import observer, shaft
+from met.substitution import butterworth, shaft
 from met.substitution.emulated import SUBSTEP
 from met.trace import cos, sin
 from met.trace.program import CallPhase, Phase, Program, Tape, Unless0
@@ -46,7 +46,7 @@ def _kernel(count: int) -> Kernel:
         p = {name: tape.input(name) for name in PARAMETERS}
         h = tape.input("time") / count
         decay = damping(p["kt"], p["resistance"], p["f_v"]) / p["inertia"]
-        coefficients = observer.over(p["f_cut"], h)
+        coefficients = butterworth.over(p["f_cut"], h)
         load, voltage = p["kt_load"] * tape.input("current"), tape.input("voltage")
         w, angle, x = tape.read("rate"), tape.input("angle"), (tape.read("filtered"), tape.read("slope"))
         for _ in range(count):
@@ -58,7 +58,7 @@ def _kernel(count: int) -> Kernel:
             )
             smooth = torque(p["kt"], p["resistance"], p["tau_max"], voltage, w) + load - p["f_v"] * w + ripple
             after = shaft.slid(w, smooth, p["f_c"], inertia=p["inertia"], decay=decay, time=h)
-            x = observer.along_line(coefficients, x, w, after)
+            x = butterworth.along_line(coefficients, x, w, after)
             angle = angle + 0.5 * h * (w + after)
             w = after
         for name, value in (("rate", w), ("filtered", x[0]), ("slope", x[1])):

@@ -77,9 +77,10 @@ def end_with_parent(number: signal.Signals) -> None:
 def put_first(process: int, priority: int, *, children: bool = True) -> None:
     """Let a process, and where asked for its children, run before all of usual priority (SCHED_FIFO). process: its
     number, 0 this one. Raises OSError."""
-    if not (hasattr(os, "sched_setscheduler") and hasattr(os, "SCHED_RESET_ON_FORK")):
+    reset = getattr(os, "SCHED_RESET_ON_FORK", None)
+    if reset is None or not hasattr(os, "sched_setscheduler"):
         raise OSError(errno.ENOSYS, os.strerror(errno.ENOSYS))
-    policy = os.SCHED_FIFO | (0 if children else os.SCHED_RESET_ON_FORK)
+    policy = os.SCHED_FIFO | (0 if children else reset)
     os.sched_setscheduler(process, policy, os.sched_param(priority))
 
 

@@ -17,7 +17,7 @@ from typing import Any
 from met.parameter import Memory, Parameter
 from met.sensors.sensor import converted
 from met.servos.motor import TABLE_1, damping, torque
-from met.substitution import observer, shaft
+from met.substitution import butterworth, shaft
 from met.substitution.bed import BedModel, Draw, Wire
 from met.trace import Real, Truth, absolute, clip, sin
 
@@ -51,7 +51,7 @@ def turned(
     """
     count = math.ceil(time / SUBSTEP - 1e-9)
     h = time / count
-    lowpass = observer.over(p.f_cut, h)
+    lowpass = butterworth.over(p.f_cut, h)
     load = p.kt_load * current
     noise = p.tachometer * draw("tachometer")
     w, angle, x = held.shaft_rate, held.shaft_angle, (held.filtered, held.filtered_slope)
@@ -63,7 +63,7 @@ def turned(
         )
         smooth = driving(w) + load - p.f_v * w + uneven
         after = shaft.slid(w, smooth, p.f_c, inertia=p.inertia, decay=decay, time=h)
-        x = observer.along_line(lowpass, x, w + noise, after + noise)
+        x = butterworth.along_line(lowpass, x, w + noise, after + noise)
         angle = angle + 0.5 * h * (w + after)
         w = after
     return {"shaft_rate": w, "shaft_angle": angle, "filtered": x[0], "filtered_slope": x[1]}

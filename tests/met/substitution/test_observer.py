@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.linalg import expm, solve_discrete_are
 
-from met.substitution import observer, shaft
+from met.substitution import butterworth, observer, shaft
 
 J, KT, R, F_V, F_C = 6.38e-5, 0.061, 2.05, 2.58e-5, 0.0205  # table 1 of Hill, Hopping and Price (1989)
 DAMPING = KT * KT / R + F_V
@@ -49,13 +49,13 @@ def test_the_filter_follows_a_straight_line_exactly() -> None:
     whole = np.zeros((4, 4))
     whole[:2, :2], whole[1, 2], whole[2, 3] = A, wc * wc, 1.0
     wanted = expm(whole * time) @ [12.0, -300.0, begin, (end - begin) / time]
-    found = observer.along_line(observer.over(f_cut, time), (12.0, -300.0), begin, end)
+    found = butterworth.along_line(butterworth.over(f_cut, time), (12.0, -300.0), begin, end)
     assert found == pytest.approx(wanted[:2], rel=1e-12)
 
 
 def test_a_filter_at_rest_with_its_drive_stays() -> None:
-    of = observer.over(50.0, 1e-3)
-    assert observer.along_line(of, (7.0, 0.0), 7.0, 7.0) == pytest.approx((7.0, 0.0), abs=1e-12)
+    of = butterworth.over(50.0, 1e-3)
+    assert butterworth.along_line(of, (7.0, 0.0), 7.0, 7.0) == pytest.approx((7.0, 0.0), abs=1e-12)
 
 
 @pytest.mark.parametrize("period", [1e-3, 1e-2])

@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from met.parameter import Memory, Parameter
-from met.substitution import BedModel, observer
+from met.substitution import BedModel, butterworth
 from met.substitution.bed import Draw, Wire
 from met.trace import Real, Truth, absolute, clip, exp
 
@@ -26,8 +26,8 @@ def advance(p: Any, held: Any, wire: Wire, time: float, draw: Draw) -> Mapping[s
     decay = p.kt * p.kt / p.resistance / p.inertia
     final = (p.kt / p.resistance * wire.voltage + p.kt_load * wire.current) / (decay * p.inertia)
     w = final + (held.shaft_rate - final) * exp(-decay * time)
-    filter = observer.over(p.f_cut, time)
-    y, slope = observer.along_line(filter, (held.filtered, held.filtered_slope), held.shaft_rate, w)
+    filter = butterworth.over(p.f_cut, time)
+    y, slope = butterworth.along_line(filter, (held.filtered, held.filtered_slope), held.shaft_rate, w)
     return {"shaft_rate": w, "filtered": y, "filtered_slope": slope}
 
 
