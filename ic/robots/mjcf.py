@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import base64
 import json
+import os
 import re
 import subprocess
 import tempfile
@@ -19,7 +20,8 @@ from ic.robots.attributes import printable
 from ic.robots.entries import rpy_of
 from ic.robots.mjcf_model import BALL, FREE, SLIDE
 from ic.robots.mjcf_xml import Source, source_of
-from ic.robots.robot import Inertial, Joint, Link, Mimic, Numbers, Robot, Written
+from ic.robots.robot import Inertial, Joint, Link, Mimic, Numbers, Robot, Visual, Written
+from ic.robots.visuals import Unseen, beside, three
 from ic.robots.xml import Element
 from ic.text.files import Files
 from ic.text.limits import MOST_LINKS
@@ -63,7 +65,9 @@ def read(root: Element, path: str, files: Files) -> Robot:
         return Written(text, name.place)
 
     inertials = [None, *(_inertial(body, source) for body in bodies)]
-    links, arm_joints = [Link(names[base], inertials[base])], list[Joint]()
+    unseen: dict[str, list[Element]] = {}
+    visuals = _visuals(model["looks"], source, os.path.dirname(path), carriers, base, unseen)
+    links, arm_joints = [Link(names[base], inertials[base], visuals.get(base, ()))], list[Joint]()
     for number, body in enumerate(bodies, 1):
         name = names[number]
         if carriers[number] != base:
@@ -74,7 +78,7 @@ def read(root: Element, path: str, files: Files) -> Robot:
                 names[body["parent"]],
                 *(new_name(name, f"{name.text}_on_{joint['name']}") for joint in own_joints[:-1]),
             ]
-            links += [*(Link(end, None) for end in ends[1:]), Link(name, inertials[number])]
+            links += [*(Link(end, None) for end in ends[1:]), Link(name, inertials[number], visuals.get(number, ()))]
             if not own_joints:
                 mount = new_name(name, f"{name.text}_mount")
                 arm_joints.append(Joint(mount, Written("fixed", name.place), ends[0], name, *_frame(body, name.place)))
@@ -101,12 +105,41 @@ def read(root: Element, path: str, files: Files) -> Robot:
         tuple(links),
         tuple(replace(joint, mimic=mimics.get(joint.name.text)) for joint in arm_joints),
         links[0],
-        {what: tuple(elements) for what, elements in dropped.items()},
+        {what: tuple(elements) for what, elements in dropped.items() if elements},
+        {reason: tuple(elements) for reason, elements in unseen.items()},
         gravity=tuple(model["gravity"]),
         base_pose=pose,
         keyframe=keyframe,
         format="MJCF",
     )
+
+
+def _visuals(
+    looks: Sequence[Mapping[str, Any]],
+    source: Source,
+    folder: str,
+    carriers: Sequence[int],
+    base: int,
+    unseen: dict[str, list[Element]],
+) -> dict[int, tuple[Visual, ...]]:
+    """The meshes that are drawn, by body. Those that are taken leave what is dropped; of the others `unseen` has the
+    elements by reason. folder: the model's"""
+    taken: dict[int, tuple[Visual, ...]] = {}
+    for look in looks:
+        shape, body = source.looks[look["name"]], look["body"]
+        name, scale = source.mesh_of(shape)
+        if carriers[body] != base:
+            continue
+        try:
+            at, rpy = tuple(look["at"]), rpy_of(look["R"])
+            visual = Visual(beside(name, folder), shape.place, at, rpy, three(scale))
+        except Unseen as reason:
+            unseen.setdefault(str(reason), []).append(shape)
+            continue
+        taken[body] = (*taken.get(body, ()), visual)
+        for tag, element in (("geom", shape), ("mesh", source.assets[shape.attributes["mesh"]])):
+            source.dropped[tag] = [other for other in source.dropped.get(tag, ()) if other is not element]
+    return taken
 
 
 def compiled(source: Source, place: Place) -> dict[str, Any]:

@@ -14,12 +14,13 @@ from collections.abc import Mapping
 from typing import Any
 
 FREE, BALL, SLIDE = 0, 1, 2  # of mjtJoint
+DRAWN = 2  # the last group of shapes that MuJoCo draws: those of collisions are in the next
 EXACT = 13  # digits of moments of inertia, as a share of the largest: MuJoCo's axes of inertia are exact to some more
 FINITE = (
     "body_pos", "body_quat", "body_mass", "body_ipos", "body_iquat", "body_inertia", "qpos0", "qpos_spring", "jnt_pos",
     "jnt_axis", "jnt_stiffness", "jnt_range", "jnt_actfrcrange", "dof_armature", "dof_damping", "dof_frictionloss",
     "actuator_gainprm", "actuator_biasprm", "actuator_gear", "actuator_ctrlrange", "actuator_forcerange", "eq_data",
-    "key_qpos", "key_ctrl",
+    "key_qpos", "key_ctrl", "geom_pos", "geom_quat",
 )  # fmt: skip
 POWERS = ("jnt_stiffnesspoly", "dof_dampingpoly")
 
@@ -36,6 +37,7 @@ def compiled_model(xml: str, files: Mapping[str, bytes]) -> dict[str, Any]:
                 None
     equalities  name, the joint that follows and its leader, ratio, offset: None where they are no straight line
     lost        actuators of which the joint's `drive` does not have the force
+    looks       points that stand for meshes in groups that MuJoCo draws: name, body, and `at` and `R` in its frame
     """
     import mujoco  # type: ignore[import-not-found]
     import numpy as np
@@ -103,10 +105,16 @@ def compiled_model(xml: str, files: Mapping[str, bytes]) -> dict[str, Any]:
         offset += model.qpos0[model.jnt_qposadr[first]] - ratio * model.qpos0[model.jnt_qposadr[second]]
         law = (joints[first]["name"], joints[second]["name"], ratio, float(offset)) if straight else None
         equalities.append((name, law))
+    looks = [
+        {"name": name, "body": int(body), "at": (model.geom_pos[i] - anchors[body]).tolist(),
+         "R": rotation(model.geom_quat[i]).tolist()}
+        for i, (name, body) in enumerate(zip(names("GEOM", model.ngeom), model.geom_bodyid, strict=True))
+        if name and model.geom_group[i] <= DRAWN
+    ]  # fmt: skip
     weightless = model.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_GRAVITY
     gravity = [0.0, 0.0, 0.0] if weightless else model.opt.gravity.tolist()
     return {"gravity": gravity, "key": key if keys else None, "bodies": bodies[1:], "joints": joints,
-            "equalities": equalities, "lost": lost}  # fmt: skip
+            "equalities": equalities, "lost": lost, "looks": looks}  # fmt: skip
 
 
 def _actuate(model: Any, joints: list[dict[str, Any]], names: list[str], controls: Any) -> list[str]:

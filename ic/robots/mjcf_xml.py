@@ -127,7 +127,9 @@ class Source:
 
     lines    the elements of `text`, one a line
     named    bodies, joints, actuators and equalities, by kind and the name in `text`, which may be made here
-    files    meshes by their names in `text`
+    files    meshes that bodies have their mass from, by their names in `text`
+    assets   elements of meshes, by name
+    looks    elements of shapes that are meshes, by the names in `text` of the points that stand for them
     dropped  elements that are not in the deck, by tag, or an attribute of which is not, by `NAME of TAG`
     """
 
@@ -138,9 +140,14 @@ class Source:
         drives = [drive for group in root.all("actuator") for drive in group.children]
         self._on_joints = [self._is_on_joint(drive) for drive in drives]
         self._meshes: set[str] = set()  # that bodies have mass from
+        self.assets: dict[str, Element] = {}  # meshes of files, by name
+        self._scales: dict[str, str] = {}  # of meshes without a scale, by class
+        for defaults in root.all("default"):
+            self._add_scales(defaults, "1 1 1")
         self.lines: list[Element] = []
         self.named: dict[tuple[str, str], Element] = {}
         self.files: dict[str, bytes] = {}
+        self.looks: dict[str, Element] = {}
         self.dropped: dict[str, list[Element]] = {}
         self.text = "".join(self._written(root, "", False))
 
@@ -171,6 +178,7 @@ class Source:
                 attributes["ctrl"] = " ".join(compress(numbers, self._on_joints))
         elif element.tag == "geom":
             self._meshes.add(attributes.get("mesh", ""))
+            attributes.pop("name", None)  # nothing that is read names it
         words = "".join(f" {name}={quoteattr(text)}" for name, text in attributes.items())
         yield f"{chr(10) if self.lines else ''}<{element.tag}{words}>"
         self.lines.append(element)
@@ -178,12 +186,52 @@ class Source:
         if element.tag == "body":
             weighs = self._settings.get("inertiafromgeom") == "true" or not any(element.all("inertial"))
         for child in sorted(element.children, key=lambda child: child.tag == "asset"):  # last, as it asks for meshes
+            if child.tag == "geom" and element.tag != "default" and child.attributes.get("type", "mesh") == "mesh":
+                yield from self._stand_in(child)
             if self._is_read(element, child, weighs):
                 yield from self._written(child, element.tag, weighs)
             elif element.tag != "default":
                 for part in child.children if child.tag in GROUPS else [child]:
                     self.dropped.setdefault(child.tag, []).append(part)
         yield f"</{element.tag}>"
+
+    def _stand_in(self, shape: Element) -> Iterator[str]:
+        """Yield the text of a point without mass where a mesh is, so that MuJoCo says where that is."""
+        if "mesh" in shape.attributes:
+            name = f"look {len(self.lines)}"
+            words = "".join(
+                f" {key}={quoteattr(text)}"
+                for key, text in shape.attributes.items()
+                if key in ("class", "group", *PLACED.split()[3:], "pos")
+            )
+            yield f'\n<geom name="{name}" type="sphere" size="1e-6" mass="0"{words}/>'
+            self.lines.append(shape)
+            self.looks[name] = shape
+
+    def _add_scales(self, defaults: Element, scale: str) -> None:
+        """Take the scales of meshes from a class and the classes in it. scale: of the class that it is in"""
+        for mesh in defaults.all("mesh"):
+            scale = mesh.attributes.get("scale", scale)
+        self._scales[defaults.attributes.get("class", "main")] = scale
+        for inner in defaults.all("default"):
+            self._add_scales(inner, scale)
+
+    def mesh_of(self, shape: Element) -> tuple[str, str]:
+        """The name of the file of a shape's mesh from the model's folder, "" where it has none, and the scale."""
+        attributes = {} if (mesh := self.assets.get(shape.attributes["mesh"])) is None else mesh.attributes
+        if "file" not in attributes or not {"refpos", "refquat"}.isdisjoint(attributes):
+            return "", ""
+        scale = attributes.get("scale", self._scales.get(attributes.get("class", "main"), "1 1 1"))
+        return os.path.normpath(os.path.join(self._mesh_folder, self._bare(attributes["file"]))), scale
+
+    @property
+    def _mesh_folder(self) -> str:
+        """The folder of meshes, from the model's."""
+        return self._settings.get("meshdir", self._settings.get("assetdir", ""))
+
+    def _bare(self, name: str) -> str:
+        """The name of a file as it is looked for."""
+        return os.path.basename(name) if self._settings.get("strippath") == "true" else name
 
     def _is_read(self, element: Element, child: Element, weighs: bool) -> bool:
         """Whether MuJoCo is given this part of an element. Raises Problem D208."""
@@ -197,14 +245,15 @@ class Source:
         if child.tag == "geom":
             return weighs and "hfield" not in child.attributes
         if (element.tag, child.tag) == ("asset", "mesh"):
-            return (child.attributes.get("name") or Path(child.attributes.get("file", "")).stem) in self._meshes
+            name = child.attributes.get("name") or Path(child.attributes.get("file", "")).stem
+            self.assets[name] = child
+            return name in self._meshes
         return child.tag in within
 
     def _mesh(self, element: Element) -> dict[str, str]:
         """Name and file of a mesh, which is read. Raises Problem D202, D215."""
-        name, settings = element.attributes["file"], self._settings
-        bare = os.path.basename(name) if settings.get("strippath") == "true" else name
-        path = _path(element, bare, self._folder, settings.get("meshdir", settings.get("assetdir", "")))
+        name = element.attributes["file"]
+        path = _path(element, self._bare(name), self._folder, self._mesh_folder)
         room = MOST_MESH_BYTES - sum(map(len, self.files.values()))
         if os.path.getsize(path) > room:
             what = f"meshes that bodies have their mass from are more than {MOST_MESH_BYTES >> 20} MiB"

@@ -58,17 +58,18 @@ def _visual(visual: Element, mesh: Element, folder: str) -> Visual:
     """A mesh in its place. Raises Unseen."""
     origin: Mapping[str, str] = next((origin.attributes for origin in visual.all("origin")), {})
     at, rpy, scale = (
-        _three(attributes.get(name, default))
+        three(attributes.get(name, default))
         for attributes, name, default in (
             (origin, "xyz", "0 0 0"),
             (origin, "rpy", "0 0 0"),
             (mesh.attributes, "scale", "1 1 1"),
         )
     )
-    return Visual(_beside(mesh.attributes.get("filename", "").strip(), folder), mesh.place, at, rpy, scale)
+    return Visual(beside(mesh.attributes.get("filename", "").strip(), folder), mesh.place, at, rpy, scale)
 
 
-def _three(text: str) -> tuple[float, float, float]:
+def three(text: str) -> tuple[float, float, float]:
+    """Three numbers of an attribute. Raises Unseen."""
     try:
         x, y, z = (float(word) for word in text.split())
     except ValueError:
@@ -78,7 +79,7 @@ def _three(text: str) -> tuple[float, float, float]:
     return (x + 0.0, y + 0.0, z + 0.0)  # -0 is 0
 
 
-def _beside(named: str, folder: str) -> str:
+def beside(named: str, folder: str) -> str:
     """The path of a file of the robot from the folder of the robot's own. Raises Unseen."""
     if not named.lower().endswith(ENDINGS):
         raise Unseen(OTHER_FORMAT)

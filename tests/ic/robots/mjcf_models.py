@@ -111,7 +111,34 @@ SCENE = """\
   <keyframe> <key qpos="0 0 0 1 0 0 0 0.1 0.2" ctrl="0 1 0"/> </keyframe>
 </mujoco>
 """
-MODELS = {"arm": ARM, "floating": FLOATING, "scene": SCENE}
+LOOKS = """\
+<mujoco>
+  <compiler angle="degree" meshdir="shapes"/>
+  <default>
+    <mesh scale="2 2 2"/>
+    <default class="seen"> <geom type="mesh" group="2" contype="0"/> <mesh scale="0.001 0.001 0.001"/> </default>
+    <default class="felt"> <geom group="3"/> </default>
+  </default>
+  <asset>
+    <mesh class="seen" file="cover.stl"/>
+    <mesh name="big" file="cover.stl"/>
+    <mesh name="other" file="cover.dae" scale="1 1 1"/>
+    <mesh name="lost" file="lost.stl"/>
+  </asset>
+  <worldbody>
+    <body name="upper" childclass="seen">
+      <joint name="turn" pos="0.1 0 0" axis="0 0 1"/>
+      <inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/>
+      <geom mesh="cover" pos="0.2 0 0" euler="90 0 0"/>
+      <geom type="mesh" mesh="big" class="felt"/>
+      <geom mesh="other"/>
+      <geom mesh="lost"/>
+      <frame pos="0 0 1" euler="0 0 90"> <geom mesh="big" pos="1 0 0"/> </frame>
+    </body>
+  </worldbody>
+</mujoco>
+"""
+MODELS = {"arm": ARM, "floating": FLOATING, "scene": SCENE, "looks": LOOKS}
 
 
 def tetrahedron() -> bytes:

@@ -63,7 +63,7 @@ arm pick_up {
         com     = [0, 0, -0.02] m;
         inertia = [0.0002951840457313, 0.0034383474956479, 0.0034383474956479] kg*m^2;
     }
-    link body_18 { mass = 0.024 kg;  inertia = [1.04e-05, 8e-06, 4e-06] kg*m^2; }
+    link body_19 { mass = 0.024 kg;  inertia = [1.04e-05, 8e-06, 4e-06] kg*m^2; }
     link right_finger { mass = 0.024 kg;  inertia = [1.04e-05, 8e-06, 4e-06] kg*m^2; }  // `right finger` in the file
 
     joint stand_mount fixed { parent = base;  child = stand;  at = [0, 0, 0.3] m; }
@@ -87,7 +87,7 @@ arm pick_up {
         axis   = [0, 0.7071067811865475, 0.7071067811865475];
     }
     joint left prismatic {  // damping 0.5
-        parent = wrist;  child = body_18;
+        parent = wrist;  child = body_19;
         at     = [0.15, 0.02, -0.02] m;
         axis   = y;
         q_min  = 0 m;  q_max = 0.04 m;
@@ -162,6 +162,7 @@ run drive like hold {
 """
 NOTES = """\
 note: attributes not read, and not in the deck: 1 solreflimit of joint, 1 timestep of option
+note: not drawn: 1 mesh not in the folders of this robot
 note: not in the deck: 2 geom: mass and inertia are in the deck; a `contact` of the environment lets two links touch
 note: not in the deck: 1 site: a place on a link is a link of `mass = 0 kg` on a fixed joint
 note: not in the deck: 1 connect: the loop is open in the deck: a stiff `bushing` of the environment closes it, or a `loop` of the arm
@@ -390,6 +391,24 @@ def test_the_command_that_writes_bodies_out_makes_a_file_that_is_read(folder: Pa
     assert len(re.findall("joint . revolute|joint j\\w+ revolute", import_robot("flat.xml"))) == 2
 
 
+@pytest.mark.usefixtures("recorded")
+def test_meshes_that_mujoco_would_draw_are_in_the_deck_by_their_frames_and_scales(meshes: None) -> None:
+    """In the frame of a class, of an element `frame`, and from the joint's anchor; those of collisions are not."""
+    (upper,) = ic.compile(text=import_robot("looks.xml")).experiments[0].structure.links
+    assert [mesh.file.rpartition("/")[2] for mesh in upper.meshes] == ["cover.stl"] * 2
+    assert [mesh.scale for mesh in upper.meshes] == [(0.001,) * 3, (2.0,) * 3]
+    at, rpy = (
+        [value for mesh in upper.meshes for value in vector(mesh)] for vector in (lambda m: m.at, lambda m: m.rpy)
+    )
+    assert at == pytest.approx([0.1, 0.0, 0.0, -0.1, 1.0, 1.0], abs=1e-15)
+    assert rpy == pytest.approx([np.pi / 2, 0.0, 0.0, 0.0, 0.0, np.pi / 2], abs=1e-15)
+    _, remarks = import_with_remarks("looks.xml")
+    assert [remark for remark in remarks if remark.startswith("not drawn")] == [
+        "not drawn: 1 mesh of another format than .stl, .obj: convert them, as Blender and MeshLab do",
+        "not drawn: 1 mesh not in the folders of this robot",
+    ]
+
+
 # Beside MuJoCo
 
 
@@ -405,6 +424,29 @@ def meshes(folder: Path) -> None:
     """The mesh that MuJoCo wants, and `met import` does not."""
     (folder / "shapes").mkdir()
     (folder / "shapes" / "cover.stl").write_bytes(tetrahedron())
+
+
+@needs_mujoco
+@pytest.mark.slow
+@pytest.mark.usefixtures("meshes")
+def test_meshes_are_where_mujoco_has_them(folder: Path) -> None:
+    """Corners in the world at the start: MuJoCo moves each mesh to its own axes of inertia."""
+    import mujoco
+
+    text = re.sub(r'<(mesh|geom)[^>]*"(other|lost)"[^>]*>', "", (folder / "looks.xml").read_text(encoding="utf-8"))
+    (folder / "two.xml").write_text(text, encoding="utf-8")
+    (upper,) = ic.compile(text=import_robot("two.xml")).experiments[0].structure.links
+    model = mujoco.MjModel.from_xml_path("two.xml")
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    drawn = [i for i in range(model.ngeom) if model.geom_group[i] == 2]
+    corners = np.array([[0, 0, 0], [0.1, 0, 0], [0, 0.1, 0], [0, 0, 0.1]])
+    for geom, mesh in zip(drawn, upper.meshes, strict=True):
+        first, count = (of[model.geom_dataid[geom]] for of in (model.mesh_vertadr, model.mesh_vertnum))
+        theirs = model.mesh_vert[first : first + count] @ data.geom_xmat[geom].reshape(3, 3).T + data.geom_xpos[geom]
+        ours = (corners * mesh.scale) @ np.array(rotation(*mesh.rpy)).T + mesh.at + [0.1, 0.0, 0.0]
+        gaps = np.linalg.norm(theirs[:, None] - ours[None], axis=2)
+        assert gaps.min(axis=1).max() < 1e-6 and gaps.min(axis=0).max() < 1e-6  # their corners are floats of 32 bits
 
 
 def fall(name: str) -> Experiment:
