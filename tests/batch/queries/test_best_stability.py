@@ -21,8 +21,7 @@ from batch.queries.best import Designs
 from batch.queries.best_answer import BestAnswer
 from batch.queries.pool import Pool
 from batch.queries.search_answers import SearchAnswer
-from batch.report.contents.designs import design_answer
-from batch.report.contents.searches import search_answer
+from batch.report.contents.designs import design_answer, search_answer
 from met.cli import main
 from met.plan.codec import encode
 from met.plan.searches import JudgedDesign, LeastMargins

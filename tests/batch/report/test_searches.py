@@ -13,8 +13,8 @@ import batch
 import ic
 from batch.archive.read import ArchiveFile
 from batch.report import report
+from batch.report.contents.designs import search_answer
 from batch.report.contents.parts import DesignAnswer, TextTable
-from batch.report.contents.searches import search_answer
 from batch.report.html.designs import HIGH, WIDE, designs
 from tests.batch.slider import swing
 
