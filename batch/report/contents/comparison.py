@@ -1,4 +1,6 @@
-"""The comparison with another archive in a page's words, which are those of `met diff`."""
+"""The comparison with another archive in a page's words, which are those of `met diff`; and the changes of required
+metrics, away from their limits, which is better, or towards them.
+"""
 
 from __future__ import annotations
 
@@ -7,13 +9,13 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from batch.differences import words
-from batch.differences.compare import DIFFERENT, EQUIVALENT, IDENTICAL, VERDICTS
+from batch.differences.compare import DIFFERENT, EQUIVALENT, IDENTICAL, VERDICTS, magnitude
 from batch.differences.result import Diff, ExperimentDiff
-from batch.queries.pool import ENDED, Pool, ranges
+from batch.differences.words import distinct_texts
+from batch.queries.pool import ENDED, CaseColumn, Pool, page_number, ranges
 from batch.report.contents.against import GOOD, ComparedArchive, EarlierCases
 from batch.report.contents.changes import PARAMETERS, ArchiveChanges, DeckTextChange, OtherOrigin, RunChanges
-from batch.report.contents.moves import metric_moves
-from batch.report.contents.parts import OutcomeCount, RequirementFlow, Verdict
+from batch.report.contents.parts import MetricMove, OutcomeCount, RequirementFlow, Verdict
 from met.messages.visible import visible
 
 MOST_LINES = 200
@@ -176,3 +178,54 @@ def _ends(both: Sequence[tuple[Pool, EarlierCases]]) -> RequirementFlow | None:
         return None
     met = f"by {was:,}, now by {now:,} of {total:,}" if was != now else f"by {now:,} of {total:,}, other ones"
     return RequirementFlow("reaches its end", met, "; ".join(gained), "; ".join(lost))
+
+
+def metric_moves(pool: Pool, before: EarlierCases, requirement: str) -> tuple[MetricMove | None, MetricMove | None]:
+    """The cases in both archives in which the metric of a requirement is better now, and those in which it is worse.
+    Changes within the tolerances, and values that are missing in one of the two, do not count."""
+    for column in pool.metrics():
+        sense = next((limit.sense for limit in column.limits if limit.text == requirement), None)
+        was = None if sense is None else before.values(column)
+        if sense is None or was is None:
+            continue
+        moved = _beyond(pool, before, column)
+        lower, higher = (moved & way for way in (column.values < was, column.values > was))
+        better_and_worse = (lower, higher) if sense == "<" else (higher, lower)
+        return _move(pool, column, was, better_and_worse[0]), _move(pool, column, was, better_and_worse[1])
+    return None, None
+
+
+def _beyond(pool: Pool, before: EarlierCases, column: CaseColumn) -> np.ndarray:
+    """True of each case in which a metric differs by more than its structure's tolerances, [case]."""
+    name = column.key.partition(":")[2]
+    now = pool.gathered(name)
+    was = np.where(before.in_both, before.pool.gathered(name)[before.place], np.nan)
+    out = np.zeros(pool.count, bool)
+    for number, _, experiment in before.pairs:
+        diff = next(
+            (signal for signal in experiment.signals if signal.metric and signal.name == name and not signal.why), None
+        )
+        if diff is not None:
+            in_both = (pool.group_of == number) & before.in_both
+            a, b, allowed = was[in_both], now[in_both], diff.tolerance
+            with np.errstate(invalid="ignore", over="ignore"):
+                limit = allowed.absolute + allowed.relative * magnitude(a, b)
+                out[in_both] = (a != b) & ~(np.abs(b - a) <= limit)
+    return out
+
+
+def _move(pool: Pool, column: CaseColumn, was: np.ndarray, moved: np.ndarray) -> MetricMove | None:
+    """The cases that moved, and the one that moved furthest; None where none did."""
+    places = np.flatnonzero(moved)
+    if not len(places):
+        return None
+    with np.errstate(over="ignore"):
+        furthest = int(places[np.abs(column.values[places] - was[places]).argmax()])
+    texts = _texts(float(was[furthest]), float(column.values[furthest]))
+    return MetricMove(len(places), int(pool.cases[furthest]), *texts, column.unit)
+
+
+def _texts(before: float, now: float) -> tuple[str, str]:
+    """The two values as a page shows them, or in more digits where these would be the same."""
+    texts = page_number(before), page_number(now)
+    return texts if texts[0] != texts[1] else distinct_texts(before, now)
