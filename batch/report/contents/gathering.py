@@ -16,7 +16,6 @@ from batch.queries.step_errors.figures import figures, together
 from batch.report.contents import comparison
 from batch.report.contents.against import ComparedArchive, EarlierCases, of_groups
 from batch.report.contents.designs import design_answer
-from batch.report.contents.evidence import evidence_part
 from batch.report.contents.histories import MOST_VALUES, WHERE_RUN_AGAIN, no_signals, signals
 from batch.report.contents.influence import influences
 from batch.report.contents.overview import overview
@@ -24,7 +23,7 @@ from batch.report.contents.parameters import parameters, varied
 from batch.report.contents.parts import Fact, Report, ReportSection, Signals, SourceListing, Stability
 from batch.report.contents.simulation import MOST_STRUCTURES, ComputedGroup, simulation
 from batch.report.contents.stability import stability
-from batch.report.contents.tables import best, replay, structures, worst
+from batch.report.contents.tables import best, evidence_part, replay, structures, worst
 from batch.report.contents.verdicts import metric_rows, verdict
 from ic.printing.columns import size as size_text
 from met.diagnostic import Problem

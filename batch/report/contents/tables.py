@@ -1,4 +1,4 @@
-"""Tables of a report: the best and the worst cases, and the structures of a sweep side by side."""
+"""Tables of a report: the best and the worst cases, the structures of a sweep side by side, and the evidence."""
 
 from __future__ import annotations
 
@@ -7,10 +7,11 @@ from dataclasses import replace
 import numpy as np
 
 from batch.archive.searched import is_search
+from batch.queries.evidence_table import NONE, EvidenceTexts, notes_of, requirement_evidence, texts_of
 from batch.queries.pool import ENDED, CaseColumn, Pool, page_number
 from batch.queries.summary import median_text
 from batch.report.contents.against import GOOD, EarlierCases
-from batch.report.contents.parts import NotableCases, TextTable
+from batch.report.contents.parts import EvidenceLine, EvidencePart, NotableCases, TextTable
 from ic.printing.columns import count as counted
 from met.distinct import distinct
 from met.outputs import quoted
@@ -135,3 +136,37 @@ def structures(pool: Pool, before: EarlierCases | None = None) -> TextTable | No
 def _good(ended: np.ndarray) -> str:
     good = int(np.isin(ended, GOOD).sum())
     return f"{good:,} ({100 * good / max(1, len(ended)):.3g} %)"
+
+
+MOST_EVIDENCE = 200
+"""Largest number of rows of a page; of more, unmet ones come first, and a sentence counts the rest."""
+
+
+def evidence_part(pool: Pool, archive: str, *, several: bool) -> EvidencePart | None:
+    """The rows, those of a requirement together, and notes; None where there are no requirements, or for a search,
+    whose verdict says everything. archive: its name in commands; several: whether these must name the run or sweep"""
+    if any(map(is_search, pool.groups)):
+        return None
+    evidence = requirement_evidence(pool.groups, archive, several=several)
+    if not evidence:
+        return None
+    shown_rows = (
+        evidence if len(evidence) <= MOST_EVIDENCE else sorted(evidence, key=lambda row: row.ok)[:MOST_EVIDENCE]
+    )
+    notes = notes_of(shown_rows)
+    if len(shown_rows) < len(evidence):
+        command = f"met show {quoted(archive)} --evidence"
+        notes.append(f"{len(evidence) - len(shown_rows):,} rows more: `{command}`")
+    rows = (
+        EvidenceLine(
+            row.requirement, row.at, row.ok, row.worst_case, row.again, _with_dashes(texts_of(row, page_number))
+        )
+        for row in shown_rows
+    )
+    return EvidencePart(tuple(rows), tuple(notes))
+
+
+def _with_dashes(texts: EvidenceTexts) -> EvidenceTexts:
+    """The texts with the page's dash in place of missing ones."""
+    names = EvidenceTexts.__dataclass_fields__
+    return EvidenceTexts(**{n: "\N{EN DASH}" if (text := getattr(texts, n)) == NONE else text for n in names})
