@@ -2,7 +2,7 @@
 
 placing   the links' frames in the world, from the numbers of a case
 shapes    simple solids and lines, fixed to the links' frames
-meshes    what links look like by files, read by mesh_files, reduced to what a picture needs
+meshes    what links look like by files, read from STL and OBJ, reduced to what a picture needs
 look      sizes, colours and the viewpoint
 scene     both as formulas of what a case records and a sweep varies, which a page replays
 acting    what acts on it: loads, contact, gas of thrusters, payloads; as such formulas too

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from batch.arms.mesh_files import MeshFault, triangles
+from batch.arms.meshes import MeshFault, triangles
 from tests.batch.arms.solids import binary_stl, box, obj, text_stl
 
 SIDES = box((1.0, 2.0, 3.0))
