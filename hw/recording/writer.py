@@ -1,29 +1,88 @@
-"""The process that writes records to the disk while the loop runs, and outlives it, so that no record is lost.
+"""Records on their way from the loop to the disk: the ring that takes them, and the process that writes them.
 
     python -m hw.recording.writer RING ROOM PIPE PATH < head
 
 RING and PIPE are files that are open already: the ring's memory, and the reading end of a pipe whose other end the loop
 has. When the loop is done, or is no more, the pipe ends; then what is left in the ring is written, and synced.
+
+The loop puts records in, the writer takes them out. The count is written after the record, and a record proves itself,
+so the writer takes none that is half there.
 """
 
 from __future__ import annotations
 
 import contextlib
 import json
+import mmap
 import os
 import select
 import signal
+import struct
 import subprocess
 import sys
+import zlib
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-from hw.recording import records, ring
-from hw.recording.ring import Ring, RingFull
+from hw.recording import records
+from hw.recording.records import SIZE
 from met.diagnostic import Problem, error
-from met.host import interpreter
+from met.host import interpreter, system
 from met.host.files import settle
+
+_COUNT = struct.Struct("<Q")
+_HEAD = 64
+"""Bytes before the records: the number of records put in, and in another cache line the number taken out."""
+
+
+class RingFull(Exception):
+    """The writer is a whole ring behind: the disk has stalled."""
+
+
+class Ring:
+    """A ring of records in shared memory. file: of the memory, from `make`;  room: number of records"""
+
+    def __init__(self, file: int, room: int) -> None:
+        self.file, self.room = file, room
+        self._memory = mmap.mmap(file, 2 * _HEAD + room * SIZE)
+        self._put = _COUNT.unpack_from(self._memory, 0)[0]
+        self._taken = _COUNT.unpack_from(self._memory, _HEAD)[0]
+
+    def put(self, record: bytes) -> None:
+        """Put a record in. Raises RingFull."""
+        if self._put - self._taken >= self.room:
+            self._taken = _COUNT.unpack_from(self._memory, _HEAD)[0]
+            if self._put - self._taken >= self.room:
+                raise RingFull
+        start = 2 * _HEAD + self._put % self.room * SIZE
+        self._memory[start : start + SIZE] = record
+        self._put += 1
+        _COUNT.pack_into(self._memory, 0, self._put)
+
+    def take(self) -> Iterator[bytes]:
+        """Take the present records, each once. A record counts as taken when the next is asked for."""
+        put_count = _COUNT.unpack_from(self._memory, 0)[0]
+        while self._taken < put_count:
+            start = 2 * _HEAD + self._taken % self.room * SIZE
+            record = self._memory[start : start + SIZE]
+            if zlib.crc32(record[:-4]) != int.from_bytes(record[-4:], "little"):
+                return  # it is not completely visible from here yet
+            yield record
+            self._taken += 1
+            _COUNT.pack_into(self._memory, _HEAD, self._taken)
+
+    def close(self) -> None:
+        self._memory.close()
+        os.close(self.file)
+
+
+def make_ring(room: int) -> Ring:
+    """A ring for `room` records, in memory without a name: it is gone with the last process that has it open."""
+    file = system.nameless_file()
+    os.ftruncate(file, 2 * _HEAD + room * SIZE)
+    return Ring(file, room)
+
 
 RING_BYTES = 64 << 20
 """Largest size of the ring, bytes: records of some minutes may wait for the disk."""
@@ -99,7 +158,7 @@ class RecordsWriter:
 def recording(path: Path, head: Mapping[str, Any], most: int) -> Iterator[Callable[[bytes], None]]:
     """Give a function that takes records, at most `most`. All are in the file at the end. Raises Problem E413, in
     the middle of a run too, so that no bed is driven without records."""
-    writer = RecordsWriter(ring.make(min(most, RING_BYTES // records.SIZE)), path, json.dumps(head).encode())
+    writer = RecordsWriter(make_ring(min(most, RING_BYTES // records.SIZE)), path, json.dumps(head).encode())
     stalled = ""
     try:
         yield writer.put
