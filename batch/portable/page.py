@@ -17,7 +17,7 @@ from batch.archive.in_memory import GroupInMemory
 from batch.archive.read import ArchiveFile, ArchiveGroup, reading
 from batch.archive.stored import Unlike
 from batch.arms.drawn import drawn_arm, drawn_json, visible_texts
-from batch.arms.scripts import arm_scripts, arm_style
+from batch.arms.look import arm_scripts, arm_style
 from batch.modules.description import MOST_CASES, described, described_columns
 from batch.portable import beside
 from batch.portable.numbers import OtherNumbers, deck_of, limits

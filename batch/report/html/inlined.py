@@ -7,7 +7,7 @@ import hashlib
 from functools import cache
 from pathlib import Path
 
-from batch.arms.scripts import arm_scripts
+from batch.arms.look import arm_scripts
 
 FOLDER = Path(__file__).with_name("assets")
 

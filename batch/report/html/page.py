@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
-from batch.arms.scripts import arm_style
+from batch.arms.look import arm_style
 from batch.report.contents.parts import DesignAnswer, Report, ReportSection
 from batch.report.html import blocks, changes, designs, inlined, tables
 from batch.report.html.head import page_head

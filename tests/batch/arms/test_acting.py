@@ -14,8 +14,8 @@ import batch
 import ic
 from batch.arms import acting
 from batch.arms.acting import ActingOnArm, NotDrawn, acting_json, acting_on
+from batch.arms.look import FOLDER
 from batch.arms.scene import arm_scene
-from batch.arms.scripts import FOLDER
 from met import models
 from met.plan import Experiment
 from tests.batch.arms.decks import about

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 import ic
+from batch.arms.look import FOLDER
 from batch.arms.scene import ArmScene, arm_scene, lacking, scene_json
-from batch.arms.scripts import FOLDER
 from met.plan import Experiment
 from tests.batch.arms.decks import about, compiled, deck, link_frames, random_joints
 

@@ -9,8 +9,7 @@ import subprocess
 import numpy as np
 import pytest
 
-from batch.arms.look import look_json
-from batch.arms.scripts import FOLDER
+from batch.arms.look import FOLDER, look_json
 
 CHOOSE = """
 const { readFileSync } = require("fs");
