@@ -40,7 +40,7 @@ class MovesRequest:
               bed
     port, baud, lock_step, transcript  as of hw.ports.Port
     records   the file that the records go to
-    sheet     parameters that are believed before, SI, by the names of hw.identify.model.MOTOR, and `v_max`, V
+    sheet     parameters that are believed before, SI, by the names of hw.identify.fit.MOTOR, and `v_max`, V
     voltage, current, rate  the most that the moves may ask for, V, A, rad/s; None: what bed and sheet allow
     """
 
