@@ -16,7 +16,7 @@ from mcap.writer import CompressionType, Writer
 from batch.export import wire
 from batch.export.mcap import MAGIC
 from batch.measured import mcap_log
-from batch.portable.beside import log_data
+from batch.portable.page import log_data
 from met import cli
 from met.diagnostic import Problem
 

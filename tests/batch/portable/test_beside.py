@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import xarray
 
-from batch.portable.beside import log_data
+from batch.portable.page import log_data
 from met import cli
 from met.diagnostic import Problem
 from tests.batch.portable.test_arm_on_page import changed, opened, pixels
