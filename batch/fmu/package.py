@@ -13,8 +13,7 @@ import zipfile
 from dataclasses import replace
 from pathlib import Path
 
-from batch.fmu.description import TOOL, Naming, build_description, model_description
-from batch.fmu.variables import FmuVariable, changing, variables
+from batch.fmu.variables import TOOL, FmuVariable, Naming, build_description, changing, model_description, variables
 from met.backends.c.emit import CSource, emit, literal
 from met.backends.c.library import FLAGS
 from met.frozen import frozen
