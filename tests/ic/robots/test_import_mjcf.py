@@ -14,9 +14,9 @@ import pytest
 import ic
 from ic.driver.import_robot import import_robot, import_with_remarks
 from ic.robots import mjcf
+from ic.robots.deck import WAYS
 from ic.robots.entries import rotation, rpy_of
 from ic.robots.mjcf_model import compiled_model
-from ic.robots.mjcf_ways import WAYS
 from met import cli, run
 from met.diagnostic import Problem
 from met.dynamics.recursion import solve
