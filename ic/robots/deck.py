@@ -12,12 +12,11 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 from ic.grammar.spell import spell
 from ic.grammar.syntax import Call, Expression, List, Setting, String
 from ic.robots.attributes import printable
-from ic.robots.doubts import in_other_units, incomplete
 from ic.robots.entries import LIMITS, ArmEntries, RobotEntry, spelled
 from ic.robots.following import hold_position
 from ic.robots.names import word
 from ic.robots.robot import MOVING, Inertial, Joint, Mimic, Robot
-from ic.robots.warnings import unseen_words
+from ic.robots.warnings import in_other_units, incomplete, unseen_words
 from ic.text.edition import EDITION_WORD, LATEST
 
 WIDE = 100  # columns of a block on one line
