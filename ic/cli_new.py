@@ -32,7 +32,7 @@ def new(kind: str, name: str, output: str | None, force: bool, quiet: bool, verb
     from ic.printing.columns import columns
 
     name = name.removesuffix(".ic")
-    texts = files.deck(name, output) if kind == "deck" else files.model(kind, name, output)
+    texts = files.new_deck(name, output) if kind == "deck" else files.model(kind, name, output)
     files.write(texts, force=force)
     if quiet:
         return
