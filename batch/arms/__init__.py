@@ -5,6 +5,6 @@ shapes    simple solids and lines, fixed to the links' frames
 meshes    what links look like by files, read from STL and OBJ, reduced to what a picture needs
 look      sizes, colours and the viewpoint, and the scripts that draw an arm on a page
 scene     both as formulas of what a case records and a sweep varies, which a page replays
-acting    what acts on it: loads, contact, gas of thrusters, payloads; as such formulas too
-drawn     scene and what acts on it together, and the columns of a run that they need
+drawn     scene and what acts on it, which is loads, contact, gas of thrusters and payloads, as such formulas too; and
+          the columns of a run that they need
 """

@@ -32,7 +32,7 @@ MET.acting = (() => {
     return { most, at: (t) => of(Math.min(rows - 1, Math.round(t / step))) };
   }
 
-  // acting: as `batch.arms.acting.acting_json` has it, or nothing; arm: as `MET.arm.make` makes it of its scene.
+  // acting: as `batch.arms.drawn.acting_json` has it, or nothing; arm: as `MET.arm.make` makes it of its scene.
   function make(acting, arm) {
     const { arrows, jets, payloads, channels } = acting;
     const formulas = MET.formulas.make(acting.nodes, acting.outputs, new Set(["time", ...channels]));

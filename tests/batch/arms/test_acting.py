@@ -12,8 +12,7 @@ import pytest
 
 import batch
 import ic
-from batch.arms import acting
-from batch.arms.acting import ActingOnArm, NotDrawn, acting_json, acting_on
+from batch.arms.drawn import ActingOnArm, NotDrawn, acting_json, acting_on
 from batch.arms.look import FOLDER
 from batch.arms.scene import arm_scene
 from met import models
@@ -203,7 +202,7 @@ def test_a_load_that_needs_what_is_not_recorded_is_not_drawn_and_says_so(tmp_pat
 def test_loads_with_more_formulas_than_a_page_should_hold_are_named(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(acting, "MOST_NODES", 400)
+    monkeypatch.setattr("batch.arms.drawn.MOST_NODES", 400)
     found = drawn(compiled(tmp_path, LEVER, "pushed"))
     assert found.not_drawn == (NotDrawn("load", "mount"), NotDrawn("load", "jet")) and found.jets == ()
     assert {each.name for each in found.arrows} == {"shove", "gust", "line", "stop", "drag"}
