@@ -29,7 +29,7 @@ from batch.queries.pool import groups_named, pools
 from batch.queries.signals import DeckUnits, Panel, deck_unit, number_texts, pretty_unit
 from batch.report.contents.designs import design_answer
 from batch.report.html import inlined
-from batch.report.html.head import page_head
+from batch.report.html.inlined import page_head
 from batch.report.html.markup import Html, el, lines
 from batch.report.html.payload import script_json
 from met.backends.wasm.module import KERNEL_JS, begun

@@ -1,4 +1,4 @@
-"""The files that a page includes: style and scripts, and an unmodified uPlot, checked by its digest."""
+"""The head of a page, and the files that it includes: style, scripts and an unmodified uPlot, checked by its digest."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from functools import cache
 from pathlib import Path
 
 from batch.arms.look import arm_scripts
+from batch.report.html.markup import Html, el, lines
 
 FOLDER = Path(__file__).with_name("assets")
 
@@ -62,3 +63,29 @@ def _read(name: str) -> str:
 def digest(text: str) -> str:
     """The name of an inline style or script in a Content-Security-Policy: `'sha256-...'`."""
     return f"'sha256-{base64.b64encode(hashlib.sha256(text.encode('utf-8')).digest()).decode('ascii')}'"
+
+
+def page_head(title: str, *, generator: str, style: str, script: str, allowed: str = "") -> Html:
+    """The elements of the head, with the style.
+
+    generator  who wrote the page;  script: the only one that it may run
+    allowed    a further source of code that its security policy grants: `'wasm-unsafe-eval'`
+    """
+    scripts = " ".join(filter(None, (digest(script), allowed)))
+    rules = (
+        f"default-src 'none'; script-src {scripts}; style-src {digest(style)}; img-src data:; "
+        "base-uri 'none'; form-action 'none'"
+    )
+    return lines(
+        [
+            el("meta", charset="utf-8"),
+            el("meta", name="generator", content=generator),
+            Html(f'<meta http-equiv="Content-Security-Policy" content="{rules}">'),
+            el("meta", name="viewport", content="width=device-width, initial-scale=1"),
+            el("meta", name="color-scheme", content="light dark"),
+            el("meta", name="referrer", content="no-referrer"),
+            el("link", rel="icon", href="data:,"),
+            el("title", title),
+            Html(f"<style>{style}</style>"),
+        ]
+    )

@@ -8,7 +8,7 @@ from dataclasses import replace
 from batch.arms.look import arm_style
 from batch.report.contents.parts import DesignAnswer, Report, ReportSection
 from batch.report.html import blocks, changes, designs, inlined, tables
-from batch.report.html.head import page_head
+from batch.report.html.inlined import page_head
 from batch.report.html.markup import Child, Html, el, join, lines
 from batch.report.html.payload import modules_script, script_json, section_data
 
