@@ -98,6 +98,8 @@ def read(root: Element, path: str, files: Files) -> Robot:
     if base:
         floating = next(joint for joint in joints if joint["body"] == base)
         pose = tuple(floating["at"]), rpy_of(floating["R"])
+        element = source.named["joint", floating["name"]]
+        dropped |= {f"{law} of a free joint": [element] for law, value in floating["passive"].items() if value}
     mimics = dict(_mimics(model["equalities"], source, {joint.name.text for joint in arm_joints}))
     return Robot(
         path,

@@ -8,13 +8,14 @@ read here, and only where a body's mass comes from them. Files are those of the 
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Iterator
 from itertools import compress
 from pathlib import Path
 from xml.sax.saxutils import quoteattr
 
 from ic.robots.attributes import printable
-from ic.robots.xml import MJCF, Element, parse
+from ic.robots.xml import Element, parse
 from ic.text.files import Files, FoundFile
 from ic.text.limits import MOST_MESH_BYTES, MOST_URDF_BYTES
 from met.diagnostic import Problem, did_you_mean, error
@@ -65,6 +66,9 @@ WITHIN = {
 """What is given to MuJoCo of the contents of an element."""
 LEFT = ("meshdir", "assetdir", "texturedir", "strippath", "fusestatic", "discardvisual", "material", "xmlns")
 """Attributes that MuJoCo is not given: where files are, which bodies and shapes it may leave out, and looks."""
+NAMING = ("name", "class", "childclass", "joint", "joint1", "joint2", "jointinparent", "mesh", "file", "model")
+"""Attributes that are names, also where they read like numbers."""
+NOT_A_NUMBER = re.compile(r"(?<!\S)[+-]?nan\b", re.IGNORECASE)
 KINDS = {
     ("", "body"): "body",
     ("", "joint"): "joint",
@@ -94,7 +98,8 @@ def source_of(root: Element, path: str, files: Files) -> Source:
 def _include(element: Element, folder: str, files: Files, included: set[str]) -> None:
     """Put the contents of included files in the place of each `<include>`. included: paths, each once"""
     for i, child in reversed([*enumerate(element.children)]):
-        if child.tag == "include":
+        is_include = child.tag == "include"
+        if is_include:
             path = _path(child, child.attributes.get("file", ""), folder)
             if os.path.realpath(path) in included:
                 what = f"`{printable(child.attributes['file'])}` is included twice"
@@ -102,10 +107,14 @@ def _include(element: Element, folder: str, files: Files, included: set[str]) ->
                 raise Problem(error("D204", what, child.place_of("file"), help=help))
             included.add(os.path.realpath(path))
             child = parse(path, files.text(FoundFile(path, path), kind=KIND, most=MOST_URDF_BYTES))
-            element.children[i : i + 1] = [child]
         _include(child, folder, files, included)
-        if child.tag in MJCF:
+        if is_include:  # whatever the root is called, as MuJoCo has it
             element.children[i : i + 1] = child.children
+
+
+def _names(element: Element) -> set[str]:
+    """The names in an element and in all that it holds."""
+    return {element.attributes.get("name", "")}.union(*map(_names, element.children))
 
 
 def _path(element: Element, name: str, folder: str, within: str = "") -> str:
@@ -139,6 +148,7 @@ class Source:
             self._settings |= compiler.attributes
         drives = [drive for group in root.all("actuator") for drive in group.children]
         self._on_joints = [self._is_on_joint(drive) for drive in drives]
+        self._names = _names(root)
         self._meshes: set[str] = set()  # that bodies have mass from
         self.assets: dict[str, Element] = {}  # meshes of files, by name
         self._scales: dict[str, str] = {}  # of meshes without a scale, by class
@@ -162,12 +172,15 @@ class Source:
             if name not in READ[element.tag].split():
                 self.dropped.setdefault(f"{name} of {element.tag}", []).append(element)
         for name, text in attributes.items():
-            if "nan" in text.lower().split():  # which MuJoCo takes for what is not written
+            if name not in NAMING and NOT_A_NUMBER.search(text):  # which MuJoCo takes for what is not written
                 what = f"`{name}` has a number that is none"
                 raise Problem(error("D206", what, element.place_of(name), help="write a number, or leave it out"))
         kind = KINDS.get((parent, element.tag)) or KINDS.get(("", element.tag))
         if kind and parent != "default":
-            attributes["name"] = element.attributes.get("name") or f"{kind}_{len(self.lines)}"
+            name = element.attributes.get("name") or f"{kind}_{len(self.lines)}"
+            while not element.attributes.get("name") and name in self._names:
+                name += "_"
+            attributes["name"] = name
             self.named[kind, attributes["name"]] = element
         elif (parent, element.tag) == ("asset", "mesh") and "file" in attributes:
             attributes |= self._mesh(element)

@@ -43,6 +43,9 @@ EARLY = {
     "bodies without end": ("D208", model(more='<replicate count="1000000000"><body/></replicate>')),
     "another model": ("D208", model(more='<attach model="other" prefix="o"/>')),
     "no number": ("D206", model().replace('pos="1 0 0"', 'pos="NaN 0 0"')),
+    "no number with a sign": ("D206", model().replace('pos="1 0 0"', 'pos="1 -nan 0"')),
+    "no number with a payload": ("D206", model().replace('pos="1 0 0"', 'pos="1 0 nan(7)"')),
+    "a model within a model": ("D208", model(after="<mujoco/>")),
     "a misspelled element": ("D208", model(more="<jiont/>")),
     "a mesh of another folder": ("D215", '<mujoco><asset><mesh name="m" file="../m.stl"/></asset><worldbody>'
      '<body><joint/><geom type="mesh" mesh="m"/></body></worldbody></mujoco>'),

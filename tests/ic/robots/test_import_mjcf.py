@@ -203,6 +203,18 @@ def test_a_base_that_floats_begins_where_the_model_has_it() -> None:
     assert wall.startswith("not in the deck: 1 body: the arm does not carry it")
 
 
+@needs_mujoco
+@pytest.mark.slow
+def test_what_holds_a_base_that_floats_is_said_not_to_be_in_the_deck(folder: Path) -> None:
+    joint = '<joint name="f" type="free" damping="3" stiffness="4" frictionloss="1" armature="0.1"/>'
+    bodies = f'<body>{joint} <geom size="1"/> <body> <joint/> <geom size="1"/> </body> </body>'
+    (folder / "held.xml").write_text(f"<mujoco><worldbody>{bodies}</worldbody></mujoco>", encoding="utf-8")
+    names = (
+        "1 damping of a free joint, 1 friction of a free joint, 1 rotor of a free joint, 1 stiffness of a free joint"
+    )
+    assert import_with_remarks("held.xml")[1][0] == f"attributes not read, and not in the deck: {names}"
+
+
 @pytest.mark.usefixtures("recorded")
 def test_what_the_arm_does_not_carry_is_left_out_and_made_names_are_new() -> None:
     text, remarks = import_with_remarks("scene.xml")
@@ -211,6 +223,17 @@ def test_what_the_arm_does_not_carry_is_left_out_and_made_names_are_new() -> Non
     ]  # fmt: skip
     assert "tau_max = 6 N*m" in text and "initial {  // the first keyframe" in text
     assert [remark.split(": ")[1] for remark in remarks] == ["2 motor", "1 body", "1 general"]
+
+
+def test_names_that_are_made_differ_from_those_of_the_file_and_a_name_may_read_like_a_number() -> None:
+    text = '<mujoco><worldbody><body name="body_3"><body name="nan"><joint/><body/></body></body></worldbody></mujoco>'
+    assert sorted(source(text).named) == [
+        ("body", "body_3"), ("body", "body_5"), ("body", "nan"), ("joint", "joint_4"),
+    ]  # fmt: skip
+    names = set(source(text.replace('"nan"', '"body_5"').replace("<body/>", '<body/><joint name="joint_4"/>')).named)
+    assert names == {
+        ("body", "body_3"), ("body", "body_5"), ("body", "body_5_"), ("joint", "joint_4_"), ("joint", "joint_4"),
+    }  # fmt: skip
 
 
 @pytest.mark.usefixtures("recorded")
@@ -230,6 +253,9 @@ def test_an_included_file_stands_where_it_is_included(folder: Path, monkeypatch:
     (folder / "arm.xml").write_text(f'{head}<include file="parts/bodies.xml"/>{rest}', encoding="utf-8")
     assert import_robot("arm.xml").partition("deck 2;")[2] == whole.partition("deck 2;")[2]
     assert ", which includes 1 more\n" in import_robot("arm.xml")
+    (folder / "parts" / "body.xml").write_text('<body name="lost"> <body name="carried"/> </body>', "utf-8")
+    text = source('<mujoco><worldbody><include file="parts/body.xml"/></worldbody></mujoco>').text
+    assert 'name="carried"' in text and "lost" not in text  # the root of an included file is not of the model
 
 
 def message(name: str = "arm.xml") -> str:
