@@ -33,8 +33,10 @@ STL_HEAD, STL_TRIANGLE = 84, 50
 """Bytes of a binary STL before its triangles, and of each triangle: a normal, three corners, two bytes."""
 
 _LONGEST = 40  # characters of a number
-_STL_CORNER = re.compile(rb"\bvertex\s+(\S{1,40})\s+(\S{1,40})\s+(\S{1,40})(?=\s)")
-_OBJ_POINT = re.compile(rb"^[ \t]*v[ \t]+(\S{1,40})[ \t]+(\S{1,40})[ \t]+(\S{1,40})", re.MULTILINE)
+_STL_CORNER = re.compile(rb"\bvertex\s+(\S{1,40})\s+(\S{1,40})\s+(\S{1,40})(?=\s)", re.IGNORECASE)
+_STL_LOOP = re.compile(rb"\bouter\s+loop\b", re.IGNORECASE)
+_OBJ_POINT = re.compile(rb"^[ \t]*v[ \t]+(\S{1,40})[ \t]+(\S{1,40})[ \t]+(\S{1,40})(?!\S)", re.MULTILINE)
+_OBJ_ANY_POINT = re.compile(rb"^[ \t]*v[ \t]", re.MULTILINE)
 _OBJ_FACE = re.compile(rb"^[ \t]*f[ \t]+([^\r\n]*)", re.MULTILINE)
 
 
@@ -70,21 +72,26 @@ def _stl(data: bytes) -> np.ndarray:
         return corners
     if not data.lstrip()[:5].lower() == b"solid":
         raise MeshFault(f"is {len(data):,} bytes long, which no STL of {max(count, 0):,} triangles is")
-    _limit(data.count(b"vertex") // 3)
+    _limit(data.lower().count(b"vertex") // 3)
     numbers = _numbers(_STL_CORNER.findall(data))
-    if len(numbers) % 3:
+    if len(numbers) != 3 * len(_STL_LOOP.findall(data)):
         raise MeshFault("has a triangle without three corners")
     return numbers.reshape(-1, 3, 3)
 
 
 def _obj(data: bytes) -> np.ndarray:
     """The triangles of an OBJ file, [triangle, corner, 3], faces of more corners cut into fans. Raises MeshFault."""
-    _limit(sum(1 for _ in _OBJ_POINT.finditer(data)))
+    count = sum(1 for _ in _OBJ_ANY_POINT.finditer(data))
+    _limit(count)
     written = list(_OBJ_POINT.finditer(data))
+    if len(written) < count:  # faces count them
+        raise MeshFault("has a point without three numbers")
     points, starts = _numbers([point.groups() for point in written]), [point.start() for point in written]
     corners: list[int] = []
     for face in _OBJ_FACE.finditer(data):
-        numbers = [int(corner.partition(b"/")[0][:_LONGEST]) for corner in face[1].split(b"#")[0].split()]
+        words = face[1].partition(b"#")[0].split(None, MOST_IN_TEXT)
+        _limit(len(words))
+        numbers = [int(corner.partition(b"/")[0][:_LONGEST]) for corner in words]
         seen = bisect_left(starts, face.start())  # a number below 0 counts back from here
         places = [number - 1 if number > 0 else seen + number for number in numbers]
         for number, place in zip(numbers, places, strict=True):
@@ -204,6 +211,7 @@ def _contents(mesh: Mesh, folder: Path) -> bytes:
     """The bytes of a mesh's file. Raises MeshFault where there is none with the digest that it had."""
     if not mesh.sha256:
         raise MeshFault("was not there when the deck was read")
+    reason = "is not there"
     for path in (Path(mesh.file), folder / mesh.file):
         try:
             data = read_regular(path, MOST_FILE_BYTES)
@@ -211,8 +219,8 @@ def _contents(mesh: Mesh, folder: Path) -> bytes:
             continue
         if hashlib.sha256(data).hexdigest() == mesh.sha256:
             return data
-        raise MeshFault("is another file than the one that the deck named")
-    raise MeshFault("is not there")
+        reason = "is another file than the one that the deck named"
+    raise MeshFault(reason)
 
 
 def _placed(mesh: Mesh, corners: np.ndarray) -> np.ndarray:

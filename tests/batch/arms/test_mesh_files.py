@@ -16,6 +16,7 @@ SIDES = box((1.0, 2.0, 3.0))
     [
         ("box.stl", binary_stl(SIDES)),
         ("BOX.STL", text_stl(SIDES)),
+        ("box.stl", text_stl(SIDES).upper()),
         ("box.obj", obj(SIDES)),
         ("box.obj", obj(SIDES, backwards=True)),
     ],
@@ -46,6 +47,10 @@ HOSTILE = {
     "an STL of text with two corners": ("a.stl", b"solid x\nvertex 0 0 0\nvertex 1 1 1\n"),
     "an STL of words": ("a.stl", b"solid x\nvertex one two three\nvertex a b c\nvertex d e f\n"),
     "an STL with one endless word": ("a.stl", b"solid x\nvertex " + b"9" * 1_000_000),
+    "an STL of text that was cut off": ("a.stl", text_stl(SIDES).rpartition(b"vertex")[0]),
+    "an STL of text with a corner of two numbers": ("a.stl", text_stl(SIDES) + b"outer loop vertex 0 0"),
+    "an OBJ with a point of two numbers": ("a.obj", b"v 0 0\n" + obj(SIDES)),
+    "an OBJ with a point of too many letters": ("a.obj", b"v 0 0 1." + b"0" * 40 + b"e9\n" + obj(SIDES)),
     "an OBJ with a point that is not there": ("a.obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 99999999999999999999\n"),
     "an OBJ with point 0": ("a.obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 0 1 2\n"),
     "an OBJ that counts back too far": ("a.obj", b"v 0 0 0\nv 1 0 0\nf -1 -2 -3\nv 0 1 0\n"),
@@ -70,6 +75,12 @@ def test_a_file_that_lies_is_refused_in_words(name: str, data: bytes) -> None:
         triangles(name, data)
     words = str(refusal.value)
     assert words.split()[0] in ("is", "has") and len(words) < 120
+
+
+def test_a_face_of_an_obj_has_no_more_corners_than_a_file_may() -> None:
+    """Its corners become numbers only up to the limit."""
+    with pytest.raises(MeshFault, match=r"^has more than 500,000 triangles or points as text"):
+        triangles("a.obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf" + b" 1" * 500_001 + b" word\n")
 
 
 def test_a_refusal_says_what_is_wrong() -> None:

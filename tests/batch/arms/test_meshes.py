@@ -127,6 +127,8 @@ def test_a_file_that_is_gone_is_looked_for_beside_the_archive(folder: Path) -> N
     (folder / "box.stl").rename(folder / "kept" / "box.stl")
     assert arm_meshes(structure, folder).words == "link bar without its mesh: box.stl is not there"
     assert len(arm_meshes(structure, folder / "kept").links) == 1
+    (folder / "box.stl").write_bytes(binary_stl(box()))  # another file of the name, where the page is made
+    assert len(arm_meshes(structure, folder / "kept").links) == 1
 
 
 @pytest.mark.parametrize(
