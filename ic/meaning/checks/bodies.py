@@ -36,7 +36,7 @@ def masses(run: RunNumbers) -> Iterator[Scale]:
         long = max(run.extents[link], 2.0 * run.length(f"{head}.com"), turned)
         long = max([long, *(run.offsets[carried_link] for carried_link in run.carried[link])])
         moments = {run.numbers.get(f"{head}.inertia.{part}") for part in INERTIA[:3]}
-        water, most = WATER * long**3, 20.0 if not run.extents[link] and len(moments) > 1 else 1e9
+        water, most = WATER * (long * long * long), 20.0 if not run.extents[link] and len(moments) > 1 else 1e9
         if water > 0.0:
             other = f"that of water in a cube as long as it, {water:.4g} kg"
             yield Scale(

@@ -388,7 +388,7 @@ def _payloads(run: RunNumbers) -> Iterator[Scale]:
 def _rotors(run: RunNumbers) -> Iterator[Scale]:
     """Inertias of rotors, as the joint feels them, beside that of all moved links at the arm's reach."""
     usual = "arms that come with MET have up to 0.2, and short stubs on a large motor far more"
-    arm = sum(run.numbers.get(f"links.{link}.mass", 0.0) for link in run.moved) * run.reach**2
+    arm = sum(run.numbers.get(f"links.{link}.mass", 0.0) for link in run.moved) * (run.reach * run.reach)
     for use in run.uses:
         ratio, rotor, path = run.of_motor(use, RATIO.name), run.of_motor(use, "j_m"), f"{use.joint}.servo.j_m"
         if ratio is not None and rotor is not None and arm > 0.0 and run.kinds[use.joint] == "revolute":

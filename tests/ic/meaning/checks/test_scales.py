@@ -261,3 +261,9 @@ def test_a_path_or_scales_must_be_asked_for_and_a_plan_has_none(
         assert said in capfd.readouterr().err
     assert main(["explain", "plan.json", "--scales"]) == 2
     assert "are of a deck; this is a plan" in capfd.readouterr().err
+
+
+@pytest.mark.parametrize("place", ["1e120", "1e200", "-1e308"])
+def test_a_length_whose_powers_no_float_has_is_remarked_on_like_others(place: str) -> None:
+    (first, _), *_ = remarks(("com = [0.3, 0, 0] m", f"com = [{place}, 0, 0] m"))
+    assert first.startswith("`links.upper.com")
