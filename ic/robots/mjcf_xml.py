@@ -88,7 +88,7 @@ def source_of(root: Element, path: str, files: Files) -> Source:
     """The part of a model that is read. path: of its file;  files: reads those that it includes. Raises Problem.
 
     D202: too many bytes;  D204: a file included twice;  D206: `nan`;  D208: an element that is not known, or stands for
-    bodies;  D215: a file that is not there, or not in the model's folder.
+    bodies, or settings that go by what is not read;  D215: a file that is not there, or not in the model's folder.
     """
     folder = os.path.dirname(path)
     _include(root, folder, files, {os.path.realpath(path)})
@@ -146,6 +146,9 @@ class Source:
         self._folder, self._settings = folder, dict[str, str]()
         for compiler in root.all("compiler"):
             self._settings |= compiler.attributes
+        if self._settings.get("fusestatic") == "true" and "settotalmass" in self._settings:
+            what, help = "`settotalmass` with `fusestatic` is not read", "write the masses of the bodies instead"
+            raise Problem(error("D208", what, root.place, help=help))  # fused bodies share in another mass
         drives = [drive for group in root.all("actuator") for drive in group.children]
         self._on_joints = [self._is_on_joint(drive) for drive in drives]
         self._names = _names(root)

@@ -45,6 +45,8 @@ EARLY = {
     "no number": ("D206", model().replace('pos="1 0 0"', 'pos="NaN 0 0"')),
     "no number with a sign": ("D206", model().replace('pos="1 0 0"', 'pos="1 -nan 0"')),
     "no number with a payload": ("D206", model().replace('pos="1 0 0"', 'pos="1 0 nan(7)"')),
+    "a total mass of bodies that are fused": ("D208", model(
+        after='<compiler settotalmass="5"/> <compiler fusestatic="true"/>')),
     "a model within a model": ("D208", model(after="<mujoco/>")),
     "a misspelled element": ("D208", model(more="<jiont/>")),
     "a mesh of another folder": ("D215", '<mujoco><asset><mesh name="m" file="../m.stl"/></asset><worldbody>'
