@@ -39,7 +39,7 @@ def compiled_model(xml: str, files: Mapping[str, bytes]) -> dict[str, Any]:
     lost        actuators of which the joint's `drive` does not have the force
     looks       points that stand for meshes in groups that MuJoCo draws: name, body, and `at` and `R` in its frame
     """
-    import mujoco  # type: ignore[import-not-found]
+    import mujoco
     import numpy as np
 
     model = mujoco.MjModel.from_xml_string(xml, dict(files))
