@@ -133,7 +133,8 @@ def tolerances(texts: Iterable[str]) -> Tolerances:
 
 
 def fits(written: str, known: Sequence[str]) -> bool:
-    """True if a tolerance as it was written has the single unit of its quantity."""
+    """True if a tolerance as it was written, "1e-6 rad/s", has the unit of its quantity. known: the SI units in which
+    the quantity occurs; with several there is none that fits."""
     wanted, *others = known
     unit = written.partition(" ")[2]
     return not others and units.same(parse_unit(unit or "1").dimension, parse_unit(wanted or "1").dimension)

@@ -263,11 +263,12 @@ class Fitter:
         with np.errstate(divide="ignore"):
             size = np.where(self.start != 0.0, np.abs(self.start), np.where(self._pull > 0.0, 1.0 / self._pull, 0.0))
         for place in np.flatnonzero((size == 0.0) | ~np.isfinite(size)):
-            size[place] = self._size_of(int(place))
+            size[place] = self._step_from_zero(int(place))
         return size
 
-    def _size_of(self, place: int) -> float:
-        """A change of a parameter that is 0, SI, large enough to change the weighted residuals."""
+    def _step_from_zero(self, place: int) -> float:
+        """How far to move a parameter whose value is 0, SI: the first of `PROBED` by which the squares of the weighted
+        residuals add up to a hundredth of their number."""
         values = np.tile(self.start, (2 * len(PROBED), 1))
         values[:, place] += [*PROBED, *(-probe for probe in PROBED)]
         change = np.sum((self.weights * (self._residuals(values) - self._first)) ** 2, axis=1)

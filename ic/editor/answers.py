@@ -50,6 +50,7 @@ class AskedPosition:
     """A position in an open text, with the deck that the text is part of, if it is known.
 
     text  the text as it is now;  file: its name in the deck's places
+    address  gives the editor's URI of a file of a deck by its name there, None where it has none
     """
 
     def __init__(

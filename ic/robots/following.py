@@ -69,7 +69,7 @@ def hold_position(joint: Joint) -> float:
 
 
 def _fixed(joint: Joint, value: float) -> Joint:
-    """The joint fixed at a position, its child where it is there."""
+    """The joint made a fixed one, whose child lies where it would at this position (m or rad)."""
     fixed = replace(joint, type=replace(joint.type, text="fixed"), axis=None)
     if joint.type.text not in MOVING or value == 0.0:
         return fixed

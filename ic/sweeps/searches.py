@@ -87,7 +87,7 @@ def read_search(
         with complaints.gather():
             # its draws are others than those of the sweep that it may share with `against`
             others = _against(definitions, complaints, reader, confirm, graph, noise_seed + 1, fixed)
-            fresh = _fresh(against, others, confirm)
+            fresh = _confirming_cases(against, others, confirm)
     if complaints.error_count > before or (name is not None and against is None):
         return empty
     chosen = [choice for choice in reader.chosen if choice.parameter.path not in fixed]
@@ -423,7 +423,7 @@ def _against(
     return sweep
 
 
-def _fresh(against: Sweep | None, drawn: Sweep | None, name: Name) -> tuple[tuple[float, ...], ...]:
+def _confirming_cases(against: Sweep | None, drawn: Sweep | None, name: Name) -> tuple[tuple[float, ...], ...]:
     """The cases of the sweep by which a tuning is confirmed, coordinates as `_plants` has them of the sweep that it is
     judged on. Raises Problem D364 where they are the same cases."""
     if drawn is None:

@@ -242,7 +242,8 @@ def warn_of_quantity(name: Token, body: list[Token], findings: Findings) -> None
 
 
 def parameters(head: list[Token]) -> tuple[str, ...] | None:
-    """The names between the parentheses of a sound definition; None where it has none."""
+    """The names between the parentheses of a sound definition; None where it has none. head: the tokens of
+    `NAME(a, b)`"""
     if not any(token.text == "(" for token in head):
         return None
     names = [token.text for token in head[2:-1] if token.kind != SPACE and token.text != ","]

@@ -102,6 +102,11 @@ def merge(
 
 
 class _Merger:
+    """The entries of a block as they are merged: those of its base, with what the block itself writes in their place.
+
+    items  by `KIND NAME`, or NAME of one without a kind
+    """
+
     def __init__(
         self, base: MergedBlock, home: str | None, base_name: str | None, complaints: Complaints, upon_name: bool
     ) -> None:

@@ -151,7 +151,7 @@ def list_arithmetic(
 
 
 def signed(operator: str, written: ValueList, place: Place) -> ValueList:
-    """A list behind a sign."""
+    """The list behind a sign: for `-` with each number negated, else as it is; its place is that of the sign."""
     if operator == "+":
         return replace(written, place=place)
     items = [replace(number, number=-number.number, decimal="") for number in _numbers(written)]

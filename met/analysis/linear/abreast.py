@@ -168,7 +168,7 @@ def side_by_side(flows: Sequence[Flow]) -> Flow:
 
 
 def alike(keys: Iterable[Key]) -> Iterator[tuple[Key, list[int]]]:
-    """Each key with the places where it stands, at most `MOST_ABREAST` at a time."""
+    """Each key with the positions that have it, in groups of at most `MOST_ABREAST`, which are computed together."""
     places = dict[Key, list[int]]()
     for place, key in enumerate(keys):
         places.setdefault(key, []).append(place)
