@@ -163,9 +163,13 @@ def _answers(A: np.ndarray, integrator: Integrator, h: float) -> tuple[np.ndarra
     roots = np.linalg.eigvals(A)
     swings = np.zeros((*roots.shape, 2, 2))
     swings[..., 0, 1] = 1.0
-    swings[..., 1, 0], swings[..., 1, 1] = -(np.abs(roots) ** 2), 2.0 * roots.real
-    factors = np.linalg.eigvals(linear_step(integrator, swings, 1, h))
-    lone = linear_step(integrator, roots.real[..., None, None], 0, h)[..., 0]
+    with np.errstate(all="ignore"):
+        swings[..., 1, 0], swings[..., 1, 1] = -(np.abs(roots) ** 2), 2.0 * roots.real
+        motions = linear_step(integrator, swings, 1, h)
+        lone = linear_step(integrator, roots.real[..., None, None], 0, h)[..., 0]
+    finite = np.isfinite(motions).all(axis=(-2, -1))  # steps of the fastest ones may overflow
+    factors = np.linalg.eigvals(np.where(finite[..., None, None], motions, 0.0))
+    factors = np.where(finite[..., None], factors, np.inf)
     every = np.concatenate([factors, np.where(roots.imag[..., None] == 0.0, lone, np.inf)], axis=-1)
     every[roots.imag < 0.0] = np.inf
     return np.repeat(roots, 3, axis=1), every.reshape(len(A), -1)

@@ -11,7 +11,7 @@ import pytest
 import ic
 from met import models
 from met import run as engine
-from met.analysis.modes import modes, slowest
+from met.analysis.modes import _answers, modes, slowest
 from met.analysis.step_map import Linearizer, StepMap, linear_step
 from met.plan import Experiment
 from met.program.step import StepPhases
@@ -229,3 +229,12 @@ def test_of_many_modes_the_inverse_is_taken_at_once_and_is_the_same(
     [many] = (each for each in modes(found, made) if each.lane == 0)
     assert many.root == pytest.approx(few.root, rel=1e-12) and many.factor == few.factor
     np.testing.assert_allclose(many.weights, few.weights, rtol=1e-12)
+
+
+@pytest.mark.parametrize("rate", [1e121, 1e160])
+def test_a_rate_whose_step_overflows_has_infinite_factors(rate: float) -> None:
+    A = np.array([[[0.0, 1.0], [-3.0, -rate]]])
+    roots, factors = _answers(A, models.find("integrator", "modified_euler", None), 1e-3)
+    fast = roots[0].real == -rate
+    assert np.isinf(factors[0][fast]).sum() >= 2
+    assert factors[0][~fast] == pytest.approx([1.0] * 3, abs=1e-12)
