@@ -264,24 +264,25 @@ def message(name: str = "arm.xml") -> str:
     return refused(problem.value)
 
 
-def answering(monkeypatch: pytest.MonkeyPatch, command: list[str]) -> None:
-    """Let this command stand for the program that asks MuJoCo."""
+def answering(monkeypatch: pytest.MonkeyPatch, program: str) -> None:
+    """Let these lines of Python stand for the program that asks MuJoCo."""
+    command = [sys.executable, "-I", "-S", "-c", f"import os; print(); {program}"]
     monkeypatch.setattr(interpreter, "command", lambda *_: command)
 
 
 @pytest.mark.parametrize(
     ("answer", "words"),
     [
-        ('echo "{\\"error\\": \\"\\"}"', "MJCF is read by MuJoCo, which is not here"),
-        ("exit 3", "MuJoCo stopped while it compiled this model, with status 3"),
-        ("kill -SEGV $$", "MuJoCo stopped while it compiled this model, with status -11"),
-        ('echo "{\\"error\\": \\"no such thing\\"}"', "MuJoCo makes no model of this: no such thing"),
+        ("""print('{"error": ""}')""", "MJCF is read by MuJoCo, which is not here"),
+        ("os._exit(3)", "MuJoCo stopped while it compiled this model, with status 3"),
+        ("os.kill(os.getpid(), 11)", "MuJoCo stopped while it compiled this model, with status -11"),
+        ("""print('{"error": "no such thing"}')""", "MuJoCo makes no model of this: no such thing"),
     ],
 )
 def test_a_model_that_is_not_compiled_is_refused_with_the_reason(
     answer: str, words: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    answering(monkeypatch, ["sh", "-c", f"echo; {answer}"])
+    answering(monkeypatch, answer)
     assert message().startswith(f"error[D269]: {words}\n --> arm.xml:1:1\n")
 
 
@@ -289,7 +290,7 @@ def test_without_mujoco_the_message_says_how_to_install_it(monkeypatch: pytest.M
     monkeypatch.setitem(sys.modules, "mujoco", None)
     with pytest.raises(ModuleNotFoundError):
         compiled_model("<mujoco/>", {})
-    answering(monkeypatch, ["sh", "-c", 'echo; echo \'{"error": ""}\''])
+    answering(monkeypatch, """print('{"error": ""}')""")
     assert (
         message()
         == """\
@@ -305,7 +306,7 @@ error[D269]: MJCF is read by MuJoCo, which is not here
 
 def test_mujocos_words_are_told_at_the_line_of_the_file(monkeypatch: pytest.MonkeyPatch) -> None:
     words = "XML Error: Schema violation: unrecognized attribute: 'poz'\nElement 'geom', line 12, column 3"
-    answering(monkeypatch, ["printf", "\\n%s\\n", json.dumps({"error": words})])
+    answering(monkeypatch, f"print({json.dumps({'error': words})!r})")
     assert (
         message()
         == """\
@@ -321,7 +322,7 @@ error[D269]: MuJoCo makes no model of this: XML Error: Schema violation: unrecog
 
 def test_a_model_that_takes_too_long_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(mjcf, "MOST_SECONDS", 0.01)
-    answering(monkeypatch, ["sleep", "10"])
+    answering(monkeypatch, "import time; time.sleep(10)")
     assert "MuJoCo has not compiled this model after 0.01 s" in message()
 
 
