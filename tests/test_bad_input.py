@@ -38,7 +38,7 @@ error[D141]: link `tip` has no `colour`
   |
 4 |     link tip { mass = 1 kg; colour = 3; shape = rod(length = 1 m, along = x); }
   |                             ^^^^^^
-  = help: it has: mass, shape, com, inertia, lumped
+  = help: it has: mass, shape, com, inertia, mesh, lumped
 
 1 error
 """,

@@ -13,7 +13,7 @@ from tests.ic.small_decks import ARM, RUN, SERVO, changed, check, messages
 
 OF_RUN = "a run has: arm, base, servos, initial, environment, rates, integrator, duration, record, tolerances, seed"
 OF_JOINT = "it has: parent, child, at, rpy, axis, dh, q_min, q_max, qd_max, tau_max, follows, ratio, offset"
-OF_LINK = "it has: mass, shape, com, inertia, lumped"
+OF_LINK = "it has: mass, shape, com, inertia, mesh, lumped"
 OF_SERVO = (
     "it has: ratio, kp, ki, v_max, k_position, resistance, kt, tau_max, j_m, f_c, f_v, friction, model, command, rate"
 )

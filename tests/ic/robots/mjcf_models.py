@@ -7,9 +7,10 @@ from __future__ import annotations
 
 import json
 import struct
+from collections.abc import Callable
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import pytest
 
@@ -18,8 +19,15 @@ from ic.robots.mjcf_xml import Source, source_of
 from ic.robots.xml import parse
 from ic.text.files import Files
 
+Test = TypeVar("Test", bound=Callable[..., object])
 RECORDED = Path(__file__).with_name("mjcf_recorded.json")
-needs_mujoco = pytest.mark.skipif(find_spec("mujoco") is None, reason="MuJoCo is not installed: pip install mujoco")
+
+
+def needs_mujoco(test: Test) -> Test:
+    """Mark a test that asks MuJoCo, which no lock names, so that it runs with `scripts/test --all` alone."""
+    missing = pytest.mark.skipif(find_spec("mujoco") is None, reason="MuJoCo is not installed: pip install mujoco")
+    return pytest.mark.release(missing(test))
+
 
 ARM = """\
 <mujoco model="pick-up">
