@@ -19,7 +19,7 @@ from typing import Any
 from ic.robots.attributes import printable
 from ic.robots.entries import rpy_of
 from ic.robots.mjcf_model import BALL, FREE, SLIDE
-from ic.robots.mjcf_xml import Source, source_of
+from ic.robots.mjcf_xml import MjcfSource, source_of
 from ic.robots.robot import Inertial, Joint, Link, Mimic, Numbers, Robot, Visual, Written
 from ic.robots.visuals import Unseen, beside, three
 from ic.robots.xml import Element
@@ -118,7 +118,7 @@ def read(root: Element, path: str, files: Files) -> Robot:
 
 def _visuals(
     looks: Sequence[Mapping[str, Any]],
-    source: Source,
+    source: MjcfSource,
     folder: str,
     carriers: Sequence[int],
     base: int,
@@ -144,8 +144,9 @@ def _visuals(
     return taken
 
 
-def compiled(source: Source, place: Place) -> dict[str, Any]:
-    """What MuJoCo makes of the model (`mjcf_model.compiled_model`). Raises Problem D269 where it makes nothing."""
+def compiled(source: MjcfSource, place: Place) -> dict[str, Any]:
+    """The model that MuJoCo compiles, in numbers (`mjcf_model.compiled_model`). Raises Problem D269 where it compiles
+    none."""
     files = {name: base64.b64encode(data).decode() for name, data in source.files.items()}
     asked = json.dumps({"xml": source.text, "files": files})
     command, variables = interpreter.command("ic.robots.mjcf_model"), interpreter.environment()
@@ -175,15 +176,15 @@ def compiled(source: Source, place: Place) -> dict[str, Any]:
     raise Problem(error("D269", what, place, help="correct the file, or take out what the arm does not need"))
 
 
-def _written(source: Source, kind: str, name: str) -> Written:
+def _written(source: MjcfSource, kind: str, name: str) -> Written:
     """A name with its place, which is its element's where the file gives it none."""
     element = source.named[kind, name]
     return Written(name, element.place_of("name") if element.attributes.get("name") else element.place)
 
 
 def _carriers(root: Element, names: Sequence[Written], model: Mapping[str, Any]) -> list[int]:
-    """Of each body, the one that floats and carries it, or the world, 0. Raises Problem D209 where not one of them
-    carries all joints."""
+    """The number of the floating body that carries each body, or 0, the world, [body]. Raises Problem D209 where not
+    one of them carries all joints."""
     free = [joint["body"] for joint in model["joints"] if joint["kind"] == FREE]
     carriers = [0]
     for number, body in enumerate(model["bodies"], 1):
@@ -199,7 +200,7 @@ def _carriers(root: Element, names: Sequence[Written], model: Mapping[str, Any])
     return carriers
 
 
-def _inertial(body: Mapping[str, Any], source: Source) -> Inertial | None:
+def _inertial(body: Mapping[str, Any], source: MjcfSource) -> Inertial | None:
     place = source.named["body", body["name"]].place
     mass, com, moments = (Numbers(tuple(values), place) for values in ([body["mass"]], body["com"], body["moments"]))
     return None if mass.nothing else Inertial(mass, com, None, moments, place)
@@ -230,7 +231,7 @@ def _joint(joint: Mapping[str, Any], name: Written, parent: Written, child: Writ
     )
 
 
-def _mimics(equalities: Sequence[Any], source: Source, joints: set[str]) -> Iterator[tuple[str, Mimic]]:
+def _mimics(equalities: Sequence[Any], source: MjcfSource, joints: set[str]) -> Iterator[tuple[str, Mimic]]:
     """The joints that follow others, by name. Equalities that are no such thing are counted."""
     leaders: dict[str, str] = {}
     for name, law in equalities:

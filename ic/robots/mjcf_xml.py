@@ -84,7 +84,7 @@ WRITTEN_OUT = (
 )
 
 
-def source_of(root: Element, path: str, files: Files) -> Source:
+def source_of(root: Element, path: str, files: Files) -> MjcfSource:
     """The part of a model that is read. path: of its file;  files: reads those that it includes. Raises Problem.
 
     D202: too many bytes;  D204: a file included twice;  D206: `nan`;  D208: an element that is not known, or stands for
@@ -92,7 +92,7 @@ def source_of(root: Element, path: str, files: Files) -> Source:
     """
     folder = os.path.dirname(path)
     _include(root, folder, files, {os.path.realpath(path)})
-    return Source(root, folder)
+    return MjcfSource(root, folder)
 
 
 def _include(element: Element, folder: str, files: Files, included: set[str]) -> None:
@@ -131,8 +131,8 @@ def _path(element: Element, name: str, folder: str, within: str = "") -> str:
     return path
 
 
-class Source:
-    """What MuJoCo is given of a model, and what of it is not read.
+class MjcfSource:
+    """The part of a model that MuJoCo is given, and the elements that are not read.
 
     lines    the elements of `text`, one a line
     named    bodies, joints, actuators and equalities, by kind and the name in `text`, which may be made here
@@ -250,7 +250,7 @@ class Source:
         return os.path.basename(name) if self._settings.get("strippath") == "true" else name
 
     def _is_read(self, element: Element, child: Element, weighs: bool) -> bool:
-        """Whether MuJoCo is given this part of an element. Raises Problem D208."""
+        """Return True if MuJoCo is given this part of an element. Raises Problem D208."""
         within = WITHIN.get(element.tag, ())
         if child.tag not in within and child.tag not in COUNTED:
             stands = [WRITTEN_OUT] if child.tag in BODIES else [*did_you_mean(child.tag, within), TAKEN_OUT]

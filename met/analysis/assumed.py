@@ -143,8 +143,8 @@ class _Along:
                 )
 
     def assumptions(self) -> Iterator[Assumption]:
-        """What the run assumes: gravity, velocity products, a base that is held, joints without drive or limits, and
-        numbers that are 0 because the deck does not say them."""
+        """The assumptions of the run: gravity, velocity products, a base that is held, joints without drive or limits,
+        and numbers that are 0 because the deck does not say them."""
         structure = self.system.structure
         if self.names and not structure.free:
             yield from self._gravity()

@@ -294,7 +294,7 @@ def owner_of(mode: Mode) -> tuple[str, str]:
 
 
 def _owner(name: str) -> tuple[str, str]:
-    """What a state belongs to, in words, and the joint that it is of ("": none). name: of its cell"""
+    """The owner of a state, in words, and the joint that it is of ("": none). name: of its cell"""
     head, _, rest = name.partition(".")
     if head.startswith(f"{BASE}:"):
         return "the base", ""

@@ -49,7 +49,7 @@ def _mean_of_exp(x: Real) -> Real:
 
 
 def content(p: Any, duration: float) -> Content:
-    """What the chirp asks of the sampling in time: its fastest swing is at one of its ends, or where the run ends
+    """The demands of the chirp on the sampling in time: its fastest swing is at one of its ends, or where the run ends
     before."""
     if p.amplitude == 0.0:
         return NEVER

@@ -39,7 +39,7 @@ def shortest(p: Any) -> Real:
 
 
 def content(p: Any, duration: float) -> Content:
-    """What the pulse asks of the sampling in time: its corners."""
+    """The demands of the pulse on the sampling in time: its corners."""
     if p.to == p.start:
         return NEVER
     rise = min(abs(p.to - p.start) / p.slope, 0.5 * p.over)

@@ -41,7 +41,7 @@ def course(p: Any, t: Real) -> tuple[Real, Real]:
 
 
 def content(p: Any, duration: float) -> Content:
-    """What the move asks of the sampling in time: when it begins and ends, s."""
+    """The demands of the move on the sampling in time: when it begins and ends, s."""
     way = abs(p.to - p.start)
     if way == 0.0:
         return NEVER

@@ -192,7 +192,7 @@ def _demand(
     torque: Real,
     begun: Mapping[str, Mapping[str, Real]],
 ) -> Demand:
-    """What a servo must give to hold its joint at the start, with the servo's inputs and parameters there."""
+    """The demand on a servo that is to hold its joint at the start, with its inputs and parameters there."""
     starts, q, qd = begun[actuator.use.joint], y.q[actuator.index], y.qd[actuator.index]
     stays = {"position": Setpoint("position", q, qd), "rate": Setpoint("rate", qd, 0.0)}
     setpoint = stays.get(actuator.command_kind, Setpoint(actuator.command_kind, 0.0, 0.0))

@@ -43,8 +43,8 @@ class Sticking:
 
 
 def sticking(system: System) -> tuple[Sticking, ...]:
-    """What may stick by dry friction: joints first, then states. A joint whose motor is on a bed is not among them,
-    since its friction is the bed's own."""
+    """The joints, and then the states, that may stick by dry friction. A joint whose motor is on a bed is not among
+    them, since its friction is the bed's own."""
     on_bed = [actuator.index for actuator, _, _ in system.mounted]
     free = [actuator for actuator in system.working if actuator.index not in on_bed]
     own = [

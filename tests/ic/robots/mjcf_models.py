@@ -15,7 +15,7 @@ from typing import Any, TypeVar
 import pytest
 
 from ic.robots import mjcf
-from ic.robots.mjcf_xml import Source, source_of
+from ic.robots.mjcf_xml import MjcfSource, source_of
 from ic.robots.xml import parse
 from ic.text.files import Files
 
@@ -157,7 +157,7 @@ def tetrahedron() -> bytes:
     return bytes(80) + struct.pack("<I", len(faces)) + b"".join(triangles)
 
 
-def source(text: str, path: str = "arm.xml") -> Source:
+def source(text: str, path: str = "arm.xml") -> MjcfSource:
     return source_of(parse(path, text), path, Files())
 
 
@@ -166,7 +166,7 @@ def play(patch: pytest.MonkeyPatch) -> None:
     recorded = json.loads(RECORDED.read_text(encoding="utf-8"))
     by_text = {source(text).text: recorded[name] for name, text in MODELS.items()}
 
-    def compiled(given: Source, place: object) -> Any:
+    def compiled(given: MjcfSource, place: object) -> Any:
         return json.loads(json.dumps(by_text[given.text]))
 
     patch.setattr(mjcf, "compiled", compiled)
