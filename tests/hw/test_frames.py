@@ -29,6 +29,7 @@ def test_a_frame_is_what_another_reading_of_the_page_makes(payload: bytes) -> No
     assert unframed(frame[:-1]) == model.payload(frame[:-1]) == payload
 
 
+@pytest.mark.slow
 @given(st.binary(max_size=220))
 def test_what_is_no_frame_is_none_for_both_readings(data: bytes) -> None:
     data = data.replace(b"\0", b"\1")

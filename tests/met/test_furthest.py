@@ -51,6 +51,7 @@ def test_a_kink_between_samples_is_not_passed_beyond(name: str) -> None:
         assert abs(far - seen) <= per_slope * up * (1.0 + 1e-9), "no more than the slower slope in a step"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["max", "min", "peak"])
 def test_the_top_of_a_sine_is_within_it_and_the_bound_falls_with_the_square_of_the_step(name: str) -> None:
     random = np.random.default_rng(6)

@@ -145,6 +145,7 @@ def test_a_mesh_in_another_unit_is_not_drawn(folder: Path, scale: str, reason: s
     assert meshes.links == () and meshes.words == words
 
 
+@pytest.mark.slow
 def test_all_links_of_an_arm_share_a_limit(folder: Path) -> None:
     (folder / "ball.stl").write_bytes(binary_stl(ball(40)))
     structure = experiment('  mesh = "ball.stl";').structure

@@ -72,6 +72,7 @@ def test_bristles_that_are_stiff_only_while_they_slide_are_told(tmp_path: Path) 
     assert codes(performed(made(tmp_path, fine), tmp_path / "b.h5")) == []
 
 
+@pytest.mark.slow
 def test_a_run_that_allows_it_is_not_told(tmp_path: Path) -> None:
     deck = changed(SLIP, ("duration", 'allow D317 because "it only rattles";\n    duration'))
     plan = made(tmp_path, deck)

@@ -428,6 +428,7 @@ def test_a_tuning_goes_by_gradients_unless_it_says_otherwise() -> None:
         assert search is not None and search.gradients is wanted
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("written", "wanted", "explained"),
     [

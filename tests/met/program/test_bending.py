@@ -69,6 +69,7 @@ def test_a_load_on_the_tip_bends_the_chain_as_a_beam(nodes: int) -> None:
     assert (share * arms).sum() == pytest.approx(0.5, rel=1e-15)
 
 
+@pytest.mark.slow
 def test_a_balanced_boom_begins_bent_by_its_load_and_stays(tmp_path: Path) -> None:
     small = changed(
         BOOM,
@@ -87,6 +88,7 @@ def test_a_balanced_boom_begins_bent_by_its_load_and_stays(tmp_path: Path) -> No
     assert run.signals["links.jib.deflection"][0, 0, 2] == pytest.approx(-1e-5 / 3.0, rel=1e-6)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("nodes", "shares"), [(4, [3e-4, 0.03]), (8, [1e-4, 5e-4, 7e-3])])
 def test_modes_of_a_clamped_boom(tmp_path: Path, nodes: int, shares: list[float]) -> None:
     exact = roots(lambda b: 1.0 / math.cosh(b) + math.cos(b), len(shares))
@@ -209,6 +211,7 @@ def test_values_of_all_joints_are_without_springs_but_for_positions(tmp_path: Pa
     assert set(q.joints) == {"root"} | found.structure.springs and len(q.joints) == 10
 
 
+@pytest.mark.slow
 def test_the_displacement_of_a_second_boom_is_what_both_bend_together(tmp_path: Path) -> None:
     """For small bends: the deflection of the first, the lever of its tip's angle, and the deflection of the second."""
     second = (

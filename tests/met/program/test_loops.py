@@ -134,6 +134,7 @@ def derivatives(function: Callable[[complex], complex], u: float) -> tuple[compl
     return first(u), (first(u + step) - first(u - step)) / (2 * step)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("text", "leader", "pose", "matter", "spring"), CASES)
 def test_the_motion_is_that_of_the_closed_form(
     tmp_path: Path, text: str, leader: str, pose: Pose, matter: tuple[float, ...], spring: tuple[float, float]
@@ -181,6 +182,7 @@ def test_integrators_keep_their_order_and_energy_stays(tmp_path: Path, text: str
     assert drifts[-1] < 1e-6
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("text", [CRANE, BARS], ids=["ram", "four bars"])
 def test_a_loop_stays_closed_to_rounding(tmp_path: Path, text: str) -> None:
     wanted = "links.rod, links.boom" if text is CRANE else "links.coupler, links.rocker"

@@ -150,6 +150,7 @@ def test_ranges_stay_among_the_shares_that_there_are() -> None:
     assert heavy is not None and all(share.first_by <= 1.0 for share in heavy.inputs)
 
 
+@pytest.mark.slow
 def test_the_means_at_the_ends_of_what_has_no_effect_are_told_apart_as_seldom_as_they_say() -> None:
     """In 5 % of samples, of any cases and of those of a design, and never of what has an effect."""
     random, apart, seen, count = np.random.default_rng(4), 0, 0, 200
