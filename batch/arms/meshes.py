@@ -34,6 +34,7 @@ STL_HEAD, STL_TRIANGLE = 84, 50
 
 _LONGEST = 40  # characters of a number
 _STL_CORNER = re.compile(rb"\bvertex\s+(\S{1,40})\s+(\S{1,40})\s+(\S{1,40})(?=\s)", re.IGNORECASE)
+_STL_NAME = re.compile(rb"^[ \t]*(?:end)?solid\b(?![^\r\n]*\bfacet\b)[^\r\n]*", re.IGNORECASE | re.MULTILINE)
 _STL_LOOP = re.compile(rb"\bouter\s+loop\b", re.IGNORECASE)
 _OBJ_POINT = re.compile(rb"^[ \t]*v[ \t]+(\S{1,40})[ \t]+(\S{1,40})[ \t]+(\S{1,40})(?!\S)", re.MULTILINE)
 _OBJ_ANY_POINT = re.compile(rb"^[ \t]*v[ \t]", re.MULTILINE)
@@ -72,6 +73,7 @@ def _stl(data: bytes) -> np.ndarray:
         return corners
     if not data.lstrip()[:5].lower() == b"solid":
         raise MeshFault(f"is {len(data):,} bytes long, which no STL of {max(count, 0):,} triangles is")
+    data = _STL_NAME.sub(b"", data)  # a name may have any words
     _limit(data.lower().count(b"vertex") // 3)
     numbers = _numbers(_STL_CORNER.findall(data))
     if len(numbers) != 3 * len(_STL_LOOP.findall(data)):
@@ -116,6 +118,9 @@ def _limit(count: int) -> None:
 
 READERS: Mapping[str, Callable[[bytes], np.ndarray]] = {"stl": _stl, "obj": _obj}
 
+
+MOST_READ = 4_000_000
+"""Number of triangles of a link with which no more of its files are read: each takes 72 bytes before it is reduced."""
 
 MOST_OF_LINK, MOST_OF_ARM = 3_000, 30_000
 """Largest number of triangles of a drawn link, and of all links of an arm."""
@@ -180,6 +185,8 @@ def arm_meshes(structure: Structure, folder: Path) -> ArmMeshes:
         parts = []
         for mesh in meshes:
             try:
+                if sum(map(len, parts)) > MOST_READ:
+                    raise MeshFault(f"comes after {MOST_READ:,} triangles of the link's other meshes")
                 parts.append(_placed(mesh, triangles(mesh.file, _contents(mesh, folder))))
             except MeshFault as fault:
                 missing.append((link, f"{mesh.file} {fault}"))

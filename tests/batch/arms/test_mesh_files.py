@@ -17,6 +17,8 @@ SIDES = box((1.0, 2.0, 3.0))
         ("box.stl", binary_stl(SIDES)),
         ("BOX.STL", text_stl(SIDES)),
         ("box.stl", text_stl(SIDES).upper()),
+        ("box.stl", text_stl(SIDES).replace(b"solid box", b"solid vertex 1 2 3")),
+        ("box.stl", text_stl(SIDES).replace(b"\n", b" ").replace(b"solid box", b"solid")),
         ("box.obj", obj(SIDES)),
         ("box.obj", obj(SIDES, backwards=True)),
     ],

@@ -83,6 +83,16 @@ def test_several_files_of_a_link_are_one_mesh(folder: Path) -> None:
     assert bar.whole == 24 and len(bar.points) == 16
 
 
+def test_no_more_files_of_a_link_are_read_than_it_can_have_triangles(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("batch.arms.meshes.MOST_READ", 20)
+    meshes = drawn('  mesh = ["box.stl", placed("box.stl", at = [2, 0, 0] m), placed("box.stl", at = [4, 0, 0] m)];')
+    assert [mesh.whole for mesh in meshes.links] == [24]
+    reason = "link bar without its mesh: box.stl comes after 20 triangles of the link's other meshes"
+    assert meshes.words.endswith(f"; {reason}")
+
+
 def test_a_page_has_the_points_to_a_thousandth_of_a_percent(folder: Path) -> None:
     points = np.array([[0.0, 0.0, 0.0], [1.0, 0.5, 0.25], [0.3, 0.2, 0.1]])
     mesh = LinkMesh("bar", points, np.array([[0, 1, 2]]), 1)
