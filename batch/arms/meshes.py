@@ -3,9 +3,9 @@
 Points of a link are put into the cells of a grid, and each cell becomes one point (vertex clustering): the finest grid
 counts that leaves few enough triangles.
 
-The files are STL, binary and as text, and OBJ. They are of others. Their numbers are taken as they are. Materials,
-textures, normals and names are left out. A file that contradicts itself is refused as a whole, with the reason in
-words.
+The files are STL, binary and as text, OBJ and glTF. They are of others. Their numbers are taken as they are.
+Materials, textures, normals and names are left out. A file that contradicts itself is refused as a whole, with the
+reason in words.
 """
 
 from __future__ import annotations
@@ -21,6 +21,7 @@ from typing import Any
 
 import numpy as np
 
+from batch.arms.gltf import gltf_triangles
 from met.dynamics.spatial import rotation_rpy
 from met.frozen import frozen
 from met.host.files import read_regular
@@ -116,7 +117,15 @@ def _limit(count: int) -> None:
         raise MeshFault(f"has more than {MOST_IN_TEXT:,} triangles or points as text: write it as binary STL")
 
 
-READERS: Mapping[str, Callable[[bytes], np.ndarray]] = {"stl": _stl, "obj": _obj}
+def _gltf(data: bytes) -> np.ndarray:
+    """The triangles of a glTF file, text or binary, [triangle, corner, 3]. Raises MeshFault."""
+    try:
+        return gltf_triangles(data)
+    except ValueError as fault:
+        raise MeshFault(str(fault)) from None
+
+
+READERS: Mapping[str, Callable[[bytes], np.ndarray]] = {"stl": _stl, "obj": _obj, "glb": _gltf, "gltf": _gltf}
 
 
 MOST_READ = 4_000_000
@@ -182,10 +191,10 @@ def arm_meshes(structure: Structure, folder: Path) -> ArmMeshes:
     most = min(MOST_OF_LINK, MOST_OF_ARM // max(1, len(named)))
     out, missing = [], []
     for link, meshes in named.items():
-        parts = []
+        parts: list[np.ndarray] = []
         for mesh in meshes:
             try:
-                if sum(map(len, parts)) > MOST_READ:
+                if sum(len(part) for part in parts) > MOST_READ:
                     raise MeshFault(f"comes after {MOST_READ:,} triangles of the link's other meshes")
                 parts.append(_placed(mesh, triangles(mesh.file, _contents(mesh, folder))))
             except MeshFault as fault:

@@ -19,7 +19,7 @@ from ic.robots.xml import Element
 from ic.text.limits import LONGEST_STRING
 from met.host.files import real_path
 
-ENDINGS = (".stl", ".obj")
+ENDINGS = (".stl", ".obj", ".glb", ".gltf")
 MOST_UP = 4
 """Largest number of folders above a file's own among which its package is looked for."""
 

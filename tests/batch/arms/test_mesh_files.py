@@ -65,7 +65,7 @@ HOSTILE = {
     "an STL with too many corners": ("a.stl", b"solid x\n" + b"vertex 0 0 0\n" * 1_500_003),
     "an OBJ of bytes": ("a.obj", bytes(range(256)) * 99),
     "an STL of bytes": ("a.stl", bytes(range(256)) * 99),
-    "a glTF, which is not read": ("a.glb", b"glTF\2\0\0\0"),
+    "a glTF of its head alone": ("a.glb", b"glTF\2\0\0\0"),
     "a format that is not read": ("a.dae", b"<COLLADA/>"),
     "a name without an ending": ("passwd", b"root:x:0:0"),
 }
@@ -90,5 +90,7 @@ def test_a_refusal_says_what_is_wrong() -> None:
         triangles("a.obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 9\n")
     with pytest.raises(MeshFault, match=r"^is 684 bytes long, which no STL of 200,000,000 triangles is$"):
         triangles("a.stl", binary_stl(SIDES, 200_000_000).replace(b"solid", b"a box", 1))
-    with pytest.raises(MeshFault, match=r"^is none of stl, obj: convert it to one of them, as Blender and MeshLab do$"):
+    with pytest.raises(
+        MeshFault, match=r"^is none of stl, obj, glb, gltf: convert it to one of them, as Blender and MeshLab do$"
+    ):
         triangles("a.dae", b"")

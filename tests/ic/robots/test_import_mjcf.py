@@ -431,7 +431,7 @@ def test_meshes_that_mujoco_would_draw_are_in_the_deck_by_their_frames_and_scale
     assert rpy == pytest.approx([np.pi / 2, 0.0, 0.0, 0.0, 0.0, np.pi / 2], abs=1e-15)
     _, remarks = import_with_remarks("looks.xml")
     assert [remark for remark in remarks if remark.startswith("not drawn")] == [
-        "not drawn: 1 mesh of another format than .stl, .obj: convert them, as Blender and MeshLab do",
+        "not drawn: 1 mesh of another format than .stl, .obj, .glb, .gltf: convert them, as Blender and MeshLab do",
         "not drawn: 1 mesh not in the folders of this robot",
     ]
 
