@@ -28,8 +28,19 @@ from hw.drives import DIALECTS, REFUSED
 from hw.drives.arming import FEED, begin_driving, forget, prove_watchdogs, switch_off
 from hw.drives.bench_file import SERIAL, TwoDrives
 from hw.drives.bus import open_bus
-from hw.drives.drive import ASKS, OWED, CanDrive, DriveReading, DriveState, Talk
-from hw.drives.frames import FAST, NOMINAL, CanFrame, CanLine, on_bus
+from hw.drives.drive import (
+    ASKS,
+    FAST,
+    NOMINAL,
+    OWED,
+    CanDrive,
+    CanFrame,
+    CanLine,
+    DriveReading,
+    DriveState,
+    Talk,
+    on_bus,
+)
 from hw.drives.odrive_lines import on_lines
 from hw.drives.side import Side, agree
 from hw.ports import Opening, PortKind

@@ -11,7 +11,6 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from hw.drives.fdcanusb import SPEEDS
 from hw.toml_file import TomlFile, quantity
 from met.diagnostic import Place, did_you_mean
 from met.frozen import frozen
@@ -20,6 +19,9 @@ MOST_BYTES = 1 << 16
 
 FDCANUSB = "fdcanusb"
 """The `interface` that is not one of python-can's."""
+
+SPEEDS = {"bitrate": "can.bitrate", "data_bitrate": "can.fd_bitrate"}
+"""Settings in `[bus]` of an fdcanusb, and its own names of them."""
 
 SERIAL, ASCII = "serial", "odrive_ascii"
 """The `interface` of drives on serial lines, one each, and the only dialect there is on them."""

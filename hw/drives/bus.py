@@ -13,8 +13,8 @@ from collections.abc import Mapping
 from typing import Any
 
 from hw.drives.bench_file import FDCANUSB, SERIAL
+from hw.drives.drive import CanFrame, CanLine
 from hw.drives.fdcanusb import LOST, FdcanusbLine
-from hw.drives.frames import CanFrame, CanLine
 from hw.drives.odrive_lines import PULLED, OdriveLines
 from hw.line import BAUD, HostClock
 from hw.lines.serial_port import SerialLine

@@ -17,8 +17,7 @@ from collections.abc import Sequence
 
 from hw.drives.bench_file import DriveEntry
 from hw.drives.checks import SELDOM, SetpointChecks
-from hw.drives.drive import CanDrive, DriveFacts, DriveReading, DriveState, Talk
-from hw.drives.frames import CanFrame
+from hw.drives.drive import CanDrive, CanFrame, DriveFacts, DriveReading, DriveState, Talk
 
 NMT, SYNC, EMERGENCY, TPDO1, RPDO1, TPDO2, SDO_ANSWER, SDO_ASK, HEARTBEAT = (
     0x000,

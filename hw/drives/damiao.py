@@ -16,8 +16,7 @@ import struct
 from collections.abc import Sequence
 
 from hw.drives.bench_file import DriveEntry
-from hw.drives.drive import ASKS, CanDrive, DriveFacts, DriveReading, DriveState, Talk
-from hw.drives.frames import CanFrame
+from hw.drives.drive import ASKS, CanDrive, CanFrame, DriveFacts, DriveReading, DriveState, Talk
 from hw.drives.mit import STEPS_12, STEPS_16, count_of, packed, value_of
 
 REGISTERS = 0x7FF

@@ -20,12 +20,10 @@ from collections import deque
 from collections.abc import Mapping
 from typing import Any
 
-from hw.drives.frames import SIZES, CanFrame
+from hw.drives.bench_file import SPEEDS
+from hw.drives.drive import SIZES, CanFrame
 from hw.line import BedLine, LineOverLine
 from met.diagnostic import Problem, error
-
-SPEEDS = {"bitrate": "can.bitrate", "data_bitrate": "can.fd_bitrate"}
-"""The adapter's names of the settings in `[bus]`."""
 
 ANSWERED = 1.0
 """Longest time for an answer while the adapter is opened, s."""

@@ -15,8 +15,7 @@ import struct
 from collections.abc import Sequence
 
 from hw.drives.bench_file import DriveEntry
-from hw.drives.drive import CanDrive, DriveFacts, DriveReading, DriveState, Talk
-from hw.drives.frames import SIZES, CanFrame
+from hw.drives.drive import SIZES, CanDrive, CanFrame, DriveFacts, DriveReading, DriveState, Talk
 
 ASKS_ANSWER = 0x8000
 INT8, INT32, FLOAT = 0, 2, 3

@@ -18,8 +18,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from hw.drives.bench_file import DriveEntry
-from hw.drives.drive import ASKS, DriveFacts, DriveReading, DriveState, Talk
-from hw.drives.frames import CanFrame
+from hw.drives.drive import ASKS, CanFrame, DriveFacts, DriveReading, DriveState, Talk
 from hw.drives.odrive_axis import (
     CLOSED_LOOP,
     IDLE,

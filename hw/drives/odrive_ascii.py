@@ -18,8 +18,7 @@ from dataclasses import replace
 
 from hw.drives.bench_file import ASCII, DriveEntry
 from hw.drives.checks import SELDOM
-from hw.drives.drive import ASKS, GREETED, DriveFacts, DriveReading, DriveState, Talk
-from hw.drives.frames import CanFrame
+from hw.drives.drive import ASKS, GREETED, CanFrame, DriveFacts, DriveReading, DriveState, Talk
 from hw.drives.odrive_axis import (
     CLOSED_LOOP,
     CONTROL_MODE,

@@ -20,7 +20,7 @@ import re
 from collections import deque
 from collections.abc import Iterable, Sequence
 
-from hw.drives.frames import CanFrame, CanLine
+from hw.drives.drive import CanFrame, CanLine
 
 USB_ANSWER = 8e-4
 """Time that a question and its answer are reckoned to take on USB at full speed, s. It was not measured: where they

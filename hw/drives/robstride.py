@@ -19,8 +19,7 @@ import struct
 from collections.abc import Mapping, Sequence
 
 from hw.drives.bench_file import DriveEntry
-from hw.drives.drive import ASKS, CanDrive, DriveFacts, DriveReading, DriveState, Talk
-from hw.drives.frames import CanFrame
+from hw.drives.drive import ASKS, CanDrive, CanFrame, DriveFacts, DriveReading, DriveState, Talk
 from hw.drives.mit import STEPS_16, count_of, value_of
 from met.diagnostic import did_you_mean
 

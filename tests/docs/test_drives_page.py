@@ -11,7 +11,7 @@ import pytest
 
 from hw.drives import DIALECTS
 from hw.drives.bench_file import FIGURES, two_drives
-from hw.drives.frames import CanFrame
+from hw.drives.drive import CanFrame
 from hw.drives.odrive_lines import on_lines
 from hw.drives.side import APART, SKEW
 from tests.hw.players import PLAYED

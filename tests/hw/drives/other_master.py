@@ -21,7 +21,7 @@ from hw.bed import BedState
 from hw.beds.can_bed import CanBed
 from hw.drives import cia402, damiao, moteus, robstride
 from hw.drives.bench_file import two_drives
-from hw.drives.frames import CanFrame
+from hw.drives.drive import CanFrame
 from hw.drives.odrive_lines import summed
 from met.diagnostic import Problem
 from met.frozen import frozen

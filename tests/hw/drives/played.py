@@ -12,7 +12,7 @@ from hw.bed import About, BedDriver, BedSample, BedState
 from hw.beds.can_bed import CanBed
 from hw.drives import DIALECTS
 from hw.drives.bench_file import TwoDrives, two_drives
-from hw.drives.frames import CanLine
+from hw.drives.drive import CanLine
 from hw.drives.odrive_lines import OdriveLines
 from met.substitution.bed import DriveCommand
 from tests.hw.drives.simulated_lines import PlayedLine, PlayedOdriveLines, Spoil, unspoiled

@@ -12,7 +12,7 @@ import heapq
 import itertools
 from collections.abc import Callable
 
-from hw.drives.frames import CanFrame, on_bus
+from hw.drives.drive import CanFrame, on_bus
 from tests.hw.players.fdcanusb import PlayedFdcanusb
 from tests.hw.players.player import PlayedBench
 

@@ -10,7 +10,7 @@ from typing import Protocol
 
 from hw.bed import BedSample, BedState, Fault
 from hw.beds.can_bed import CanBed
-from hw.drives.frames import CanFrame
+from hw.drives.drive import CanFrame
 from hw.drives.side import SKEW
 from met.diagnostic import Problem
 from tests.hw.players.player import PlayedBench

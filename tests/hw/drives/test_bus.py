@@ -10,8 +10,7 @@ import pytest
 from hw.bed import BedDriver
 from hw.beds.can_bed import PORT
 from hw.drives.bus import PythonCanLine
-from hw.drives.drive import Talk
-from hw.drives.frames import CanFrame, on_bus
+from hw.drives.drive import CanFrame, Talk, on_bus
 from hw.ports import Opening, Port
 from tests.hw.conftest import refusal
 from tests.hw.drives.played import bench_file

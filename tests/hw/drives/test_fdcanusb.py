@@ -15,8 +15,8 @@ from hw.bed import BedDriver, BedState
 from hw.beds.can_bed import PORT, CanBed
 from hw.drives.bench_file import two_drives
 from hw.drives.bus import open_bus
+from hw.drives.drive import CanFrame
 from hw.drives.fdcanusb import LONGEST_LINE, FdcanusbLine, frame_of
-from hw.drives.frames import CanFrame
 from hw.ports import Opening, Port
 from met.diagnostic import Problem
 from tests.hw.conftest import refusal

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from hw.drives.bench_file import two_drives
-from hw.drives.frames import CanFrame
+from hw.drives.drive import CanFrame
 from tests.hw.drives.played import bench_file, host_of, played_bench
 from tests.hw.drives.simulated_lines import PlayedLine
 from tests.hw.players.damiao import PlayedDamiao

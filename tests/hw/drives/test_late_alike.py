@@ -11,8 +11,7 @@ import pytest
 
 from hw.beds.can_bed import CanBed
 from hw.drives.bench_file import two_drives
-from hw.drives.drive import OWED, REMEMBERED, CanDrive
-from hw.drives.frames import CanFrame
+from hw.drives.drive import OWED, REMEMBERED, CanDrive, CanFrame
 from hw.drives.odrive import ESTIMATES, OdriveDrive
 from met.substitution.bed import DriveCommand
 from tests.hw.drives.played import bench_file, host_of, line_of, period_of, played_bench

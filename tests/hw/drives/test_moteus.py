@@ -12,7 +12,7 @@ import pytest
 from hw.bed import BedDriver, BedState, Capability, Fault
 from hw.beds.can_bed import CanBed
 from hw.drives.bench_file import two_drives
-from hw.drives.frames import CanFrame
+from hw.drives.drive import CanFrame
 from hw.drives.moteus import MoteusDrive, answered, asked_for, number, padded, written
 from tests.hw.conftest import refusal
 from tests.hw.drives.played import PlayedConformance, bench_file, go, host_of, played_bench

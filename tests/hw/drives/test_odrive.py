@@ -10,7 +10,7 @@ import pytest
 
 from hw.bed import BedDriver
 from hw.drives.bench_file import two_drives
-from hw.drives.frames import CanFrame
+from hw.drives.drive import CanFrame
 from tests.hw.conftest import refusal
 from tests.hw.drives.played import PlayedConformance, bench_file, host_of, played_bench
 from tests.hw.drives.simulated_lines import PlayedLine

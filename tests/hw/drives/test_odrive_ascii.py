@@ -15,7 +15,7 @@ import pytest
 from hw.bed import BedDriver, BedState, Fault
 from hw.beds.can_bed import PORT, CanBed
 from hw.drives.bench_file import two_drives
-from hw.drives.frames import CanFrame
+from hw.drives.drive import CanFrame
 from hw.drives.odrive_lines import OWED, USB_ANSWER, OdriveLines, checked, on_lines, summed
 from hw.ports import Opening, Port
 from met.diagnostic import Problem

@@ -11,7 +11,7 @@ from hw.bed import BedState, Fault
 from hw.drives import DIALECTS
 from hw.drives.bench_file import two_drives
 from hw.drives.checks import AGAIN, DOUBTS, TOLD, SetpointChecks
-from hw.drives.frames import CanFrame
+from hw.drives.drive import CanFrame
 from met.substitution.bed import DriveCommand
 from tests.hw.conftest import refusal
 from tests.hw.drives.other_master import WAYS, commands, interfere, run

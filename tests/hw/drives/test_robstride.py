@@ -12,7 +12,7 @@ import pytest
 from hw.bed import BedDriver, BedState, Fault
 from hw.beds.can_bed import CanBed
 from hw.drives.bench_file import DriveEntry, two_drives
-from hw.drives.frames import CanFrame
+from hw.drives.drive import CanFrame
 from hw.drives.mit import STEPS_16
 from hw.drives.robstride import RobstrideDrive
 from tests.hw.conftest import refusal

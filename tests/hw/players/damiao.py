@@ -5,7 +5,7 @@ from __future__ import annotations
 import struct
 from collections.abc import Sequence
 
-from hw.drives.frames import CanFrame
+from hw.drives.drive import CanFrame
 from tests.hw.players.player import PlayedDrive
 from tests.hw.players.shaft import OFF, Output
 

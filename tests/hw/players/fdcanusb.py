@@ -14,7 +14,7 @@ from typing import Any
 
 from hw.drives.bench_file import FDCANUSB, SERIAL
 from hw.drives.bus import open_bus
-from hw.drives.frames import CanFrame, CanLine
+from hw.drives.drive import CanFrame, CanLine
 from tests.hw.players.odrive_ascii import PlayedOdrivePorts
 from tests.hw.players.terminal import Terminal
 

@@ -10,7 +10,7 @@ import struct
 from collections.abc import Sequence
 from typing import Any
 
-from hw.drives.frames import CanFrame
+from hw.drives.drive import CanFrame
 from tests.hw.players.player import PlayedDrive
 from tests.hw.players.shaft import OFF, Output
 

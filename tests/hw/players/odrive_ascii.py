@@ -14,7 +14,7 @@ import time
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from hw.drives.frames import CanFrame
+from hw.drives.drive import CanFrame
 from tests.hw.players.odrive import PlayedOdrive
 from tests.hw.players.terminal import Terminal
 

@@ -8,7 +8,7 @@ from abc import ABC, abstractmethod
 from collections import deque
 from collections.abc import Callable, Sequence
 
-from hw.drives.frames import CanFrame, CanLine
+from hw.drives.drive import CanFrame, CanLine
 from tests.hw.players.shaft import OFF, Output, PlayedShaft
 
 

@@ -6,7 +6,7 @@ import math
 import struct
 from collections.abc import Sequence
 
-from hw.drives.frames import CanFrame
+from hw.drives.drive import CanFrame
 from tests.hw.players.player import PlayedDrive
 from tests.hw.players.shaft import OFF, Output
 
