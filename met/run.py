@@ -15,16 +15,15 @@ from met import backends
 from met.backends.backend import Kernel
 from met.causes import causes_of, doubt_of
 from met.frozen import frozen
-from met.judging import judge
 from met.passing import Memories, run_past
 from met.plan import REPEAT, Cases, Experiment, keys
 from met.plan.judged import ANSWERED, NOT_ASKED, WHY_ANSWER, WHY_NONE
 from met.plan.limits import LimitUse, extremes, limits
 from met.plan.outputs import GRAPPLE_FIGURES, grappled_payloads
 from met.program import cells, plausible
-from met.program.build import COORDINATE, METRIC, build
+from met.program.build import COORDINATE, METRIC, UNHELD, build
 from met.program.control.substituted import LIMITED
-from met.program.step import EVENTS
+from met.program.step import EVENTS, FAILURE, TOO_FAST, UNBALANCED
 from met.program.system import FURTHEST
 from met.trace.identity import result_keys, state_key
 from met.trace.program import Program, Recording
@@ -284,6 +283,28 @@ def compute(
                 history = _together(watched, history, others)
     judge(prepared.program.outputs, outputs)
     return history, with_linear(prepared, outputs)
+
+
+def judge(names: Sequence[str], outputs: np.ndarray) -> None:
+    """Write failures into the outputs [case, output], whose names these are: those that the program's watch found in
+    cases which it carried to their end. The first failure of each case stays."""
+    column = {name: outputs[:, place] for place, name in enumerate(names)}
+    failure, subject, tick = (column[name] for name in FAILURE)
+
+    def write(first: np.ndarray, cause: float, number: np.ndarray, ticks: np.ndarray) -> None:
+        failure[first], subject[first], tick[first] = cause, number[first], ticks[first]
+
+    if plausible.FAILED_TICK in column:
+        failed_tick = column[plausible.FAILED_TICK]
+        write(
+            (failed_tick != 0.0) & ((failure == 0.0) | (tick > failed_tick)),
+            TOO_FAST,
+            column[plausible.OF],
+            failed_tick,
+        )
+    if UNHELD in column:
+        unheld = column[UNHELD]
+        write((unheld != 0.0) & ((failure == 0.0) | (tick > 0.0)), UNBALANCED, unheld - 1.0, np.zeros_like(tick))
 
 
 def with_linear(prepared: Prepared, outputs: np.ndarray) -> np.ndarray:

@@ -21,7 +21,6 @@ from met import run as engine
 from met.causes import causes_of
 from met.diagnostic import Problem, did_you_mean, error
 from met.frozen import frozen
-from met.judging import judge
 from met.plan import REPEAT, Recorded, ServoUse, Structure
 from met.plan.channel import COMMAND_UNIT, joint_unit, recordable
 from met.program import plausible
@@ -162,7 +161,7 @@ class SteppedRun:
             return ""
         names = self._prepared.program.outputs
         outputs = self._block.outputs[: len(names), :1].T.copy()
-        judge(names, outputs)
+        engine.judge(names, outputs)
         by_name = {name: outputs[:, column] for column, name in enumerate(names)}
         input_values = self._block.inputs[:, :1].T
         return causes_of(self._prepared.experiment, input_values, by_name)[0]

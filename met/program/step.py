@@ -33,7 +33,7 @@ from met.trace.program import CallPhase, Control, Every, Phase, RunPhase, Tape, 
 
 SINGULAR, NOT_FINITE, OUT_OF_RANGE, UNBALANCED, TOO_FAST = 1.0, 2.0, 4.0, 5.0, 6.0
 """Causes of a failed case (output `failure`); 0 is none, and 3 an end from outside (met/run.py). UNBALANCED and
-TOO_FAST are judged after the run, from other outputs (met/judging.py)."""
+TOO_FAST are judged after the run, from other outputs (`met.run.judge`)."""
 
 FAILURE = ("failure", "failure.joint", "failure.tick")
 """Outputs of a failed case: its cause, the number of the joint, body or sensor, and the tick."""

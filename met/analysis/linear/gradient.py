@@ -21,11 +21,11 @@ from met.analysis.linear.period import is_converter
 from met.backends.backend import Kernel
 from met.diagnostic import Problem, did_you_mean, error
 from met.frozen import frozen
-from met.judging import judge
 from met.plan import Experiment
 from met.program.build import METRIC, Builder
 from met.program.step import FAILURE
 from met.program.system import System
+from met.run import judge
 from met.trace.differentiated import Dependence, dependence, differentiated
 from met.trace.program import Recording
 from met.trace.recorder import record
