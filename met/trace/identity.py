@@ -17,8 +17,16 @@ from collections.abc import Collection, Iterable, Mapping
 from typing import Any
 
 from met.trace.nodes import OPERANDS, live
-from met.trace.program import Branch, CodeSection, RecordedControl, Recording, RecordSection, WhileAny
-from met.trace.slicing import cells_behind, slice_roots
+from met.trace.program import (
+    Branch,
+    CodeSection,
+    RecordedControl,
+    Recording,
+    RecordSection,
+    WhileAny,
+    cells_behind,
+    slice_roots,
+)
 
 
 def state_key(recording: Recording) -> str:

@@ -25,10 +25,11 @@ from met.trace.program import (
     RunSection,
     Unless0,
     WhileAny,
+    cells_behind,
+    slice_roots,
     walk,
 )
 from met.trace.scalar import Mask, Scalar
-from met.trace.slicing import cells_behind, slice_roots
 
 
 class RecordingTape:

@@ -23,9 +23,8 @@ from met.program.control.sensing import READING
 from met.program.motion import bodies
 from met.program.system import Actuator, System
 from met.servos.servo import Seen, Setpoint
-from met.trace.program import Branch, CodeSection, RecordedControl, RecordSection, Tape, Unless0, WhileAny
+from met.trace.program import Branch, CodeSection, RecordedControl, RecordSection, Tape, Unless0, WhileAny, sections_in
 from met.trace.recorder import record
-from met.trace.slicing import sections_in
 from met.trace.tangents import TangentSection, moved_by, with_tangents
 
 if TYPE_CHECKING:
