@@ -5,19 +5,25 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import NamedTuple
 
+from met.dynamics.floating import accelerated, factors
 from met.dynamics.joints import JointTransform
 from met.dynamics.spatial import (
     HERE,
+    NOTHING,
     ZERO,
     Pose,
     Real,
+    Rigid,
     Vector,
     add,
+    add_rigid,
     apply_symmetric,
     compose,
     cross,
     dot,
     is_zero,
+    rigid_raise,
+    rigid_sum,
     scale,
     sub,
     turn_vector,
@@ -170,6 +176,46 @@ def jacobian(
     return tuple(columns)
 
 
+def base_answers(tree: Tree, q: Sequence[Real], base: Pose = HERE) -> tuple[tuple[Vector, Vector], ...]:
+    """For each joint, the angular velocity of a free base and the velocity of its origin, world axes, for each unit of
+    that joint's rate, where no external force acts: the base's part of the generalized Jacobian.
+
+        H V_b + sum_i h_i qd_i = P      V_b the base's twist, P the momentum, H of all bodies together
+
+    so for each joint V_b changes by -H^-1 h_i for each unit of its rate (Umetani and Yoshida, Resolved motion rate
+    control of space manipulators with generalized Jacobian matrix, IEEE Trans. Robotics Autom. 5, 1989). h_i is the
+    momentum of all that joint i carries, as it moves with unit rate. Rotors have none, as in `energy`.
+
+    The tree floats; base: its frame in the world.
+    """
+    assert tree.floating is not None
+    about_origin = Pose(base.R, ZERO)  # everything about the base's origin
+    steps = tuple(joint.at(q[i]) for i, joint in enumerate(tree.joints))
+    poses = joint_poses(tree, steps, about_origin)
+    carried = [rigid_raise(joint.body, pose) for joint, pose in zip(tree.joints, poses, strict=True)]
+    whole = rigid_raise(tree.floating.body, compose(about_origin, tree.base))
+    for i in reversed(tree.order):
+        parent = tree.joints[i].parent
+        if parent < 0:
+            whole = rigid_sum(whole, carried[i])
+        else:
+            carried[parent] = rigid_sum(carried[parent], carried[i])
+    LDL, _ = factors(add_rigid(NOTHING, whole), (0.0, 0.0))
+    answers = []
+    for joint, (R, p), body in zip(tree.joints, poses, carried, strict=True):
+        axis = (R[0][2], R[1][2], R[2][2])
+        angular, linear = (axis, cross(p, axis)) if joint.kind == "revolute" else (ZERO, axis)
+        w, v = accelerated(LDL, *momentum(body, (angular, linear)))
+        answers.append((scale(-1.0, w), scale(-1.0, v)))
+    return tuple(answers)
+
+
+def momentum(body: Rigid, twist: tuple[Vector, Vector]) -> tuple[Vector, Vector]:
+    """I V of a body: angular momentum about its frame's origin and momentum, in its axes, kg m^2/s and kg m/s."""
+    w, v = twist
+    return add(apply_symmetric(body.I, w), cross(body.h, v)), sub(scale(body.mass, v), cross(body.h, w))
+
+
 def fixed_acceleration(w: Vector, acceleration: tuple[Vector, Vector], inner: Pose) -> tuple[Vector, Vector]:
     """The acceleration of a frame fixed, at the given pose, to one that turns at w; in its own axes."""
     wd, a = acceleration
@@ -227,10 +273,10 @@ def energy(
     kinetic: Real = 0.0
     weighed, linear, angular = ZERO, ZERO, ZERO
     for i, ((m, h, I), (R, p), (w, v)) in enumerate(zip(bodies, poses, rates, strict=True)):  # noqa: E741
-        momentum = sub(scale(m, v), cross(h, w))
+        own_momentum = sub(scale(m, v), cross(h, w))
         turning = add(apply_symmetric(I, w), cross(h, v))
-        kinetic = kinetic + 0.5 * (dot(w, turning) + dot(v, momentum))
-        turned = turn_vector(R, momentum)
+        kinetic = kinetic + 0.5 * (dot(w, turning) + dot(v, own_momentum))
+        turned = turn_vector(R, own_momentum)
         linear = add(linear, turned)
         angular = add(angular, add(turn_vector(R, turning), cross(p, turned)))
         weighed = add(weighed, add(scale(m, p), turn_vector(R, h)))

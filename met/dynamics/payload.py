@@ -16,7 +16,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from met.dynamics.floating import accelerated, factors
-from met.dynamics.kinematics import Energy, LinkMotion, fixed_motion
+from met.dynamics.kinematics import Energy, LinkMotion, fixed_motion, momentum
 from met.dynamics.recursion import Wrench, rate_wrench
 from met.dynamics.spatial import (
     NOTHING,
@@ -27,7 +27,6 @@ from met.dynamics.spatial import (
     Vector,
     add,
     add_rigid,
-    apply_symmetric,
     compose,
     cross,
     dot,
@@ -74,12 +73,6 @@ def free_acceleration(body: Rigid, w: Vector, wrench: Wrench, gravity: Vector) -
     LDL, _ = factors(add_rigid(NOTHING, body), (0.0, 0.0))
     wd, a = accelerated(LDL, sub(moment, gyroscopic), sub(force, centrifugal))
     return wd, add(a, gravity)
-
-
-def momentum(body: Rigid, twist: Twist) -> Wrench:
-    """I V of a body: angular momentum about its frame's origin and momentum, in its axes, kg m^2/s and kg m/s."""
-    w, v = twist
-    return add(apply_symmetric(body.I, w), cross(body.h, v)), sub(scale(body.mass, v), cross(body.h, w))
 
 
 def twist_against(body: LinkMotion, link: LinkMotion) -> Twist:

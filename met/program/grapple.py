@@ -20,8 +20,8 @@ from collections.abc import Callable, Mapping
 from functools import partial
 
 from met.dynamics.coupling import solve_coupled
-from met.dynamics.kinematics import LinkMotion, fixed_motion
-from met.dynamics.payload import Twist, momentum, raised, twist_against
+from met.dynamics.kinematics import LinkMotion, fixed_motion, momentum
+from met.dynamics.payload import Twist, raised, twist_against
 from met.dynamics.recursion import Wrench, solve
 from met.dynamics.spatial import ZERO, Vector, add, choose, compose, cross, dot, inverse, sub, turn_vector
 from met.integrators.integrator import Motion

@@ -11,8 +11,7 @@ from functools import cached_property
 
 from met import models
 from met.dynamics.coupling import at_leaders
-from met.dynamics.generalized import base_answers
-from met.dynamics.kinematics import jacobian
+from met.dynamics.kinematics import base_answers, jacobian
 from met.dynamics.spatial import (
     Matrix,
     Vector,

@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from met.dynamics.generalized import base_answers
-from met.dynamics.kinematics import energy
+from met.dynamics.kinematics import base_answers, energy
 from met.dynamics.spatial import Pose
 from tests.met.dynamics.test_free_base import fleet, vector
 from tests.oracles.pinocchio_floating import Flight, FloatingPinocchio

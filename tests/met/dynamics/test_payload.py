@@ -9,13 +9,12 @@ import numpy as np
 import pytest
 
 from met.dynamics.effective_inertia import effective_inertia
-from met.dynamics.kinematics import Energy, LinkMotion, energy, link_motions
+from met.dynamics.kinematics import Energy, LinkMotion, energy, link_motions, momentum
 from met.dynamics.payload import (
     energy_of,
     free_acceleration,
     in_tree,
     loaded,
-    momentum,
     raised,
     twist_against,
 )
