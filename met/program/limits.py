@@ -12,9 +12,9 @@ from met.plan.limits import LimitUse, extremes, limits
 from met.program import cells
 from met.program.cells import answer
 from met.program.control.guiding import course_values
-from met.program.joint_limits import excess
 from met.program.motion.base import ArmWorld, base_of, environment_values
 from met.program.motion.bodies import tree_with_payloads
+from met.program.observe import excess
 from met.program.step import StepPhases
 from met.program.system import System
 from met.trace import Real, Truth, absolute, any_of, maximum, where

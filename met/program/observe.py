@@ -26,11 +26,10 @@ from met.plan.chains import chains
 from met.plan.channel import WXYZ, XYZ, Channel
 from met.program.cells import answer, returned
 from met.program.evaluation import Derivative
-from met.program.joint_limits import excess
 from met.program.motion import bodies
 from met.program.motion.base import ArmWorld, BaseMotion, environment_values, motions
 from met.program.system import ReadCell, System
-from met.trace import Real, minimum, sqrt, where
+from met.trace import Real, absolute, minimum, sqrt, where
 from met.trace.program import Tape
 from met.vectors import Quaternion, dot, quaternion
 
@@ -309,3 +308,15 @@ def _components(name: str, q: Quaternion) -> dict[str, Real]:
 
 def _cells(name: str, last: str) -> list[str]:
     return [f"{last}{name}.{part}" for part in WXYZ]
+
+
+def excess(joint: str, limit: str, value: Real, read: ReadCell) -> Real:
+    """The distance of a joint beyond a limit of this name and value, in the limit's unit; below 0 within the limit.
+    Limits are watched, and do not affect the motion.
+
+    Its position and rate are those of the state, its torque that of the derivative taken last.
+    """
+    if limit in ("q_min", "q_max"):
+        q = read(f"{joint}.q")
+        return value - q if limit == "q_min" else q - value
+    return absolute(read(f"{joint}.{'qd' if limit == 'qd_max' else 'tau'}")) - value
