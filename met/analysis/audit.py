@@ -15,7 +15,7 @@ from met.analysis.memo import AnalysisMemo
 from met.plan import Experiment
 from met.program.build import COORDINATE, build
 from met.trace.nodes import live
-from met.trace.program import CodeSection, Program, Unless0, WhileAny, walk
+from met.trace.program import CodeSection, Program, Unless0, slice_roots
 from met.trace.recorder import SectionRecorder, record
 
 
@@ -57,25 +57,17 @@ def _idle_inputs_of_chain(chain: Experiment) -> tuple[str, ...]:
 
 def _unread(program: Program, sections: Iterable[CodeSection]) -> tuple[str, ...]:
     """Inputs from which these sections compute nothing that the program records, gives or decides by."""
-    control = walk((*program.start, *program.tick, *program.end))
-    needed = {node.cell for node in control if isinstance(node, WhileAny)}
+    needed = program.loop_cells
     outputs = {n for n, name in enumerate(program.outputs) if not name.startswith(COORDINATE)}
+    columns = range(program.columns)
     read: set[str] = set()
     while True:
         cells_read: set[str] = set()
         for section in sections:
-            inputs, cells = _reads(section, needed, outputs)
-            read |= inputs
-            cells_read |= cells
+            roots = slice_roots(section, needed, outputs, columns)
+            used = [section.nodes[position] for position in live(section.nodes, roots)]
+            read |= {node[1] for node in used if node[0] == "input"}
+            cells_read |= {node[1] for node in used if node[0] == "cell"}
         if cells_read <= needed or len(read) == len(program.inputs):
             return tuple(name for name in program.inputs if name not in read)
         needed |= cells_read
-
-
-def _reads(section: CodeSection, needed: set[str], outputs: set[int]) -> tuple[set[str], set[str]]:
-    """Inputs and cells from which the section computes the needed cells, the given outputs and its recorded values."""
-    roots = [ref for cell, ref in section.stores if cell in needed]
-    roots += [ref for _, ref in section.records]
-    roots += [ref for number, ref in section.outputs if number in outputs]
-    used = [section.nodes[position] for position in live(section.nodes, roots)]
-    return {node[1] for node in used if node[0] == "input"}, {node[1] for node in used if node[0] == "cell"}

@@ -46,6 +46,7 @@ from met.trace.program import (
     Tape,
     Unless0,
     WhileAny,
+    sections_in,
     walk,
 )
 from met.trace.recorder import record
@@ -252,8 +253,7 @@ def _chains() -> tuple[Work, int]:
 
 def hoisted(experiment: Experiment, recording: Recording) -> Iterator[Input]:
     """For each coordinate, the work that is done before the first step, and the work left to a step."""
-    sections = {step.section for step in _all(recording.start) if isinstance(step, RunSection)}
-    ticking = {step.section for step in _all(recording.tick) if isinstance(step, (RunSection, RecordSection))}
+    sections, ticking = set(sections_in(recording.start)), set(sections_in(recording.tick))
     for coordinate in experiment.cases.coordinates:
         count, stored = 0, set()
         for section in (recording.sections[i] for i in sections):
@@ -417,13 +417,6 @@ def _best(works: Sequence[Work]) -> list[float]:
             if turn:
                 least[i] = min(least[i], time.thread_time() - begun)
     return least
-
-
-def _all(body: tuple[RecordedControl, ...]) -> Iterator[RecordedControl]:
-    for node in body:
-        yield node
-        if isinstance(node, Branch):
-            yield from _all(node.body)
 
 
 def as_data(run_profile: RunProfile) -> Mapping[str, Any]:

@@ -15,7 +15,7 @@ from met.frozen import frozen
 from met.trace import check
 from met.trace.fuse import fused_from
 from met.trace.nodes import OPERANDS
-from met.trace.program import CodeSection, Recording, WhileAny, walk
+from met.trace.program import CodeSection, Recording
 from met.trace.recorder import used_cells, without_dead_stores
 from met.trace.tangents import HEAD, Straight, moved_by, moving_nodes, with_tangents
 
@@ -28,9 +28,7 @@ def differentiated(recording: Recording, inputs: Collection[str], straight: Stra
     tangent_sections = [
         _section(section, moving, inputs, straight, len(program.outputs)) for section in recording.sections
     ]
-    condition_cells = {
-        node.cell for node in walk((*program.start, *program.tick, *program.end)) if isinstance(node, WhileAny)
-    }
+    condition_cells = program.loop_cells
     sections = without_dead_stores(tangent_sections, condition_cells)
     tangent_recording = Recording(
         replace(

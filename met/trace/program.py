@@ -220,6 +220,11 @@ class Program:
             raise ValueError(f"a program records at one rate, not at every {sorted(divisors)} ticks")
         return divisors.pop() if divisors else 1
 
+    @property
+    def loop_cells(self) -> set[str]:
+        """The cells that control loops (`WhileAny`)."""
+        return {node.cell for node in walk((*self.start, *self.tick, *self.end)) if isinstance(node, WhileAny)}
+
 
 def walk(body: tuple[Control, ...]) -> Iterator[Control]:
     """All control nodes, outer ones first."""

@@ -178,9 +178,7 @@ def record(program: Program, *, fuse: bool = True) -> Recording:
     )
     sections = recorder.sections
     _check_complete(program, sections)
-    condition_cells = {
-        node.cell for node in walk((*program.start, *program.tick, *program.end)) if isinstance(node, WhileAny)
-    }
+    condition_cells = program.loop_cells
     live_sections = without_dead_stores(sections, condition_cells)
     _check_written(program, live_sections, condition_cells)
     cells = used_cells(live_sections, condition_cells)
