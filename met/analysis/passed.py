@@ -112,9 +112,9 @@ def lasting(experiment: Experiment, passed: Passed) -> tuple[Lasting, ...]:
         quiet = fastest(as_it_is) <= least(as_it_is, schedule.duration)
     seen = _Seen(_by_owner(as_run(linearizer.map()), integrator, len(times)), times, _stretches(passed), schedule.step)
     held = ticking(sampled) if sampled is not None else frozenset()
-    every = [seen.growing(quiet), seen.missed(held)]
+    every = [list(seen.growing(quiet)), list(seen.missed(held))]
     if not any(every):
-        every.append(seen.fast())
+        every.append(list(seen.fast()))
     in_truth = [
         isinstance(candidate.fault, StepFault) and candidate.fault.mode.grows_in_truth(schedule.step)
         for candidate in every[0]
@@ -153,24 +153,21 @@ class _Seen:
     stretches: Sequence[tuple[int, int]]
     h: float
 
-    def growing(self, quiet: np.ndarray) -> list[_Candidate]:
+    def growing(self, quiet: np.ndarray) -> Iterator[_Candidate]:
         """Modes that the step makes grow by e and more, where no law holds them."""
         by_lane = self._passing(lambda mode, lane: mode.grown(self.h, 1) > 0.0 and not quiet[lane])
-        candidates = []
         for owner, first, last in _lasting_ones(by_lane, self.stretches):
             of_each = [max(by_lane[lane][owner], key=lambda mode: mode.growth) for lane in range(first, last + 1)]
             grown = _over([mode.grown(self.h, 1) for mode in of_each], self.times[first : last + 1], self.h)
             if grown > GROWS:
                 worst = max(of_each, key=lambda mode: mode.growth)
                 fault = StepFault("grows", worst, *owner, worst.growth, 0.0, 0.0)
-                candidates.append(_Candidate(grown, fault, worst.lane, first, last))
-        return candidates
+                yield _Candidate(grown, fault, worst.lane, first, last)
 
-    def missed(self, held: frozenset[str]) -> list[_Candidate]:
+    def missed(self, held: frozenset[str]) -> Iterator[_Candidate]:
         """The mode that swings and is damped, or not, unlike in truth over the whole time, judged at its best
         instant."""
         by_lane = self._passing(lambda mode, _: abs(mode.root.imag) > abs(mode.root.real))
-        candidates = []
         for owner, first, last in _lasting_ones(by_lane, self.stretches):
             steps = round((self.times[last] - self.times[first]) / self.h)
 
@@ -182,22 +179,19 @@ class _Seen:
             if lost(best) > TELLING and owner[1] not in held and steps > BESIDE:
                 run, truth, k = best.missed(self.h, steps)
                 fault = StepFault("misses", best, *owner, run, truth, k * self.h)
-                candidates.append(_Candidate(lost(best), fault, best.lane, first, last))
-        return candidates
+                yield _Candidate(lost(best), fault, best.lane, first, last)
 
-    def fast(self) -> list[_Candidate]:
+    def fast(self) -> Iterator[_Candidate]:
         """Modes whose rate is too fast for the step, |root| h above `FAST`, for longer than some steps: at their worst
         instants."""
         by_lane = self._passing(lambda mode, _: abs(mode.root) * self.h > FAST * (1.0 + 1e-6))
-        candidates = []
         for owner, first, last in _lasting_ones(by_lane, self.stretches):
             every = [mode for lane in range(first, last + 1) for mode in by_lane[lane][owner]]
             worst = max(every, key=lambda mode: round(abs(mode.root) * self.h, 6))
             figure = abs(worst.root) * self.h
             fault = StepFault("fast", worst, *owner, figure, 0.0, 0.0)
             if round((self.times[last] - self.times[first]) / self.h) > BESIDE:
-                candidates.append(_Candidate(figure, fault, worst.lane, first, last))
-        return candidates
+                yield _Candidate(figure, fault, worst.lane, first, last)
 
     def _passing(self, telling: Callable[[Mode, int], bool]) -> list[dict[Owner, list[Mode]]]:
         """The modes of each lane and owner that pass a test."""

@@ -238,12 +238,6 @@ def _faults(
     every: Sequence[Mode], quiet: np.ndarray, held: Collection[str], h: float, steps: int
 ) -> Iterator[StepFault]:
     """The worst fault of each kind. quiet: cases whose frames do not grow;  held: joints whose laws tick"""
-
-    def fault(
-        kind: Literal["grows", "misses", "fast"], mode: Mode, figure: float, truth: float, after: float
-    ) -> StepFault:
-        return StepFault(kind, mode, *owner_of(mode), figure, truth, after)
-
     growing_modes = [
         candidate
         for candidate in every
@@ -251,15 +245,15 @@ def _faults(
     ]
     if growing_modes:
         worst = max(growing_modes, key=lambda candidate: (candidate.growth, not candidate.loose))
-        yield fault("grows", worst, worst.growth, 0.0, 0.0)
+        yield StepFault("grows", worst, *owner_of(worst), worst.growth, 0.0, 0.0)
     missing = [(candidate, *candidate.missed(h, steps)) for candidate in every]
     missing = [miss for miss in missing if abs(miss[1] - miss[2]) > TELLING and owner_of(miss[0])[1] not in held]
     if missing:
         mode, run, truth, k = max(missing, key=lambda miss: (abs(miss[1] - miss[2]), not miss[0].loose))
-        yield fault("misses", mode, run, truth, k * h)
+        yield StepFault("misses", mode, *owner_of(mode), run, truth, k * h)
     fast = max(every, key=lambda candidate: _speed(candidate, h), default=None)
     if fast is not None and abs(fast.root) * h > FAST * (1.0 + 1e-6):
-        yield fault("fast", fast, abs(fast.root) * h, 0.0, 0.0)
+        yield StepFault("fast", fast, *owner_of(fast), abs(fast.root) * h, 0.0, 0.0)
 
 
 def remedy(
@@ -270,8 +264,8 @@ def remedy(
     step_map  has the mode;  memory: of the case at its instant, one lane, as `Linearizer` takes it
     """
     structure, mode = experiment.structure, fault.mode
-    integrator, steps = models.find("integrator", structure.integrator), structure.schedule.ticks
-    steps //= structure.schedule.dynamics
+    integrator = models.find("integrator", structure.integrator)
+    steps = structure.schedule.ticks // structure.schedule.dynamics
     followed = abs(mode.root) * step_map.h <= FAST
     others = tuple(
         name
