@@ -211,7 +211,7 @@ class _Linearised:
         by], without noise. The slope is taken over several changes; the one that agrees best with its neighbour is
         kept."""
         tape, states, held = self.tape, [part.name for part in fitted.states], [part.name for part in fitted.memory]
-        (column,) = (k for k, name in enumerate(self.quantity_names()) if name == sensing.quantity(fitted))
+        column = self.quantity_names().index(sensing.quantity(fitted))
         start = np.array([self._seen()[column], *(tape.lane(f"{fitted.path}.{name}") for name in (*states, *held))])
         count, sizes = len(start), len(READINGS)
         moved, changes = to_both_sides(np.repeat(start, sizes, axis=1), np.tile(READINGS, tape.lanes))

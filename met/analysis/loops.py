@@ -215,6 +215,12 @@ def _length(loops: SampledLoops) -> int:
     return math.lcm(loops.divisor, *(law.divisor for law in loops.laws if not law.continuous))
 
 
+def events(loops: SampledLoops) -> int:
+    """The number of ticks and steps in a frame."""
+    length = _length(loops)
+    return length // loops.divisor + sum(length // law.divisor for law in loops.laws)
+
+
 def growths(
     loops: SampledLoops, lanes: np.ndarray, gains: Gains | None = None, *, ticks: bool, direct: bool = False
 ) -> np.ndarray:
@@ -345,8 +351,8 @@ def _eigenvalues(matrices: np.ndarray) -> np.ndarray:
 def fastest(loops: SampledLoops) -> np.ndarray:
     """The largest growth rate of each lane, 1/s: infinite where it is not finite, or a frame is too long to be
     analysed."""
-    length, rates = _length(loops), np.full(len(loops.case), math.inf)
-    if length // loops.divisor + sum(length // law.divisor for law in loops.laws) <= MOST_EVENTS:
+    rates = np.full(len(loops.case), math.inf)
+    if events(loops) <= MOST_EVENTS:
         lanes = np.flatnonzero(_numbers(loops))
         if len(lanes):
             rates[lanes] = growths(loops, lanes, ticks=True).max(1, initial=-math.inf)

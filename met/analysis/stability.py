@@ -15,7 +15,7 @@ import numpy as np
 
 from met.analysis.laws import SampledLaw
 from met.analysis.linear.margins import ScalarLoop, gain_limits, margins
-from met.analysis.loops import LEAST, MOST_EVENTS, frame, opened, seconds
+from met.analysis.loops import LEAST, MOST_EVENTS, events, frame, opened, seconds
 from met.analysis.passed import Passed
 from met.analysis.step_map import Linearizer, SampledLoops
 from met.frozen import frozen
@@ -53,7 +53,7 @@ def least_margins(experiment: Experiment, passed: Passed) -> LeastMargins | str:
         return "no law closes a loop over the arm"
     if linearizer.continuous:
         return f"the law of joint `{min(linearizer.continuous)}` is continuous"
-    if _events(sampled) > MOST_EVENTS:
+    if events(sampled) > MOST_EVENTS:
         return "the rates of dynamics and servos have no common period that is short enough"
     if not np.isfinite(sampled.slope).all():
         return "the arm has no finite slopes at an instant"
@@ -99,7 +99,7 @@ def margins_at_start(experiment: Experiment, rows: Sequence[int], least: float) 
         return None
     linearizer = Linearizer(experiment, rows)
     sampled = linearizer.sampled()
-    if sampled is None or linearizer.continuous or _events(sampled) > MOST_EVENTS:
+    if sampled is None or linearizer.continuous or events(sampled) > MOST_EVENTS:
         return None
     disks, lanes = np.full(len(sampled.case), math.inf), np.arange(len(sampled.case))
     fine = np.isfinite(sampled.slope).all((1, 2))
@@ -117,12 +117,6 @@ def margins_at_start(experiment: Experiment, rows: Sequence[int], least: float) 
     )
     together = np.maximum(raised, lowered) <= 1.0 + LEAST
     return np.where(together, disks, np.minimum(disks, SHORT * least))
-
-
-def _events(sampled: SampledLoops) -> int:
-    """Ticks and steps in a frame."""
-    length = round(seconds(sampled) * sampled.base_hz)
-    return length // sampled.divisor + sum(length // law.divisor for law in sampled.laws)
 
 
 @frozen

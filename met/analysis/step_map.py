@@ -10,7 +10,7 @@ equal. About a moving state the second includes the change of A within the step,
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -23,6 +23,7 @@ from met.frozen import frozen
 from met.integrators.integrator import Integrator, Motion, Slope
 from met.parameter import Parameter
 from met.plan import Experiment
+from met.plan.columns import blocks
 from met.program.build import Builder
 from met.program.cells import FIRST, FRICTION_MODE, HOLDING, SLOPE
 from met.program.evaluation import brake_levels
@@ -146,7 +147,7 @@ class Linearizer:
         self.slope = np.zeros((2 * lanes, len(self.cells), len(self.cells) + len(self.held)))
         numbers = {name: place for place, name in enumerate((*self.cells, *self.held))}
         places = np.array([numbers[name] for name in (*self.cells, *own)], dtype=int)
-        for block in _blocks(len(places), max(1, AT_ONCE // (4 * lanes))):
+        for block in blocks(len(places), max(1, AT_ONCE // (4 * lanes))):
             wide, moved, sizes = self._moved((*self.cells, *own), block)
             with np.errstate(all="ignore"):
                 wide.cells.update({name: moved[name] for name in own})
@@ -288,11 +289,6 @@ class Linearizer:
         for body in free:
             ends |= _turns(body, wide, len(self.cells))
         return differences(ends, self.cells, sizes)
-
-
-def _blocks(count: int, size: int) -> Iterator[slice]:
-    """Numbers from 0 on in blocks of this size."""
-    return (slice(first, first + size) for first in range(0, count, size))
 
 
 def linear_step(integrator: Integrator, A: np.ndarray, positions: int, h: float) -> np.ndarray:
