@@ -47,7 +47,7 @@ def check_model(name: str, experiment: Experiment, joint: str) -> None:
     kind.check(name.partition(":")[2], experiment, joint)
     if not kind.needs:
         return
-    use = next(substitution for substitution in experiment.structure.substitutions if substitution.joint == joint)
+    use = experiment.structure.on_beds[joint]
     for needed in kind.needs:
         if f"{joint}.bed.{needed.name}" not in experiment.parameters:
             whose = f"bed model `{use.bed}` of joint `{joint}`"

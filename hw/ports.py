@@ -66,9 +66,7 @@ class Opening:
         """The quantity that the deck's bed model sends the drive; None where no deck was given."""
         if self.experiment is None:
             return None
-        use = next(
-            substitution for substitution in self.experiment.structure.substitutions if substitution.joint == self.joint
-        )
+        use = self.experiment.structure.on_beds[self.joint]
         return models.find("bed", use.bed, use.place).drive
 
     def bed_values(self) -> dict[str, float]:

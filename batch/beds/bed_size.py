@@ -13,7 +13,7 @@ from hw.beds.serial_line import least_baud
 from hw.driving.pace import Pace, pace
 from hw.motor_parts import Bench, MotorPart, PartsList
 from met.analysis.margin import Margin, margins
-from met.analysis.shaft_work import not_for_a_bed, on_bed, servo_of, shaft_work, substitution_of
+from met.analysis.shaft_work import not_for_a_bed, on_bed, servo_of, shaft_work
 from met.diagnostic import Problem, did_you_mean, error
 from met.frozen import frozen
 from met.plan import Experiment, Origin, Quantity
@@ -193,7 +193,7 @@ def _notes(experiment: Experiment, joint: str, figures: BedFigures, candidates: 
     use, schedule = servo_of(experiment, joint), experiment.structure.schedule
     assert use is not None
     yield "all of it is simulated: no real bed has been driven with this version"
-    on = substitution_of(experiment, joint)
+    on = experiment.structure.on_beds.get(joint)
     scaled = on is not None and on.scaled
     if on is not None:
         yield "friction, noise and converters of the bed are in the figures as far as the deck's bed has them"

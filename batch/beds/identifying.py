@@ -294,7 +294,7 @@ def included(
     from ic.formatting.formatter import formatted
 
     head = re.sub(r"\W", "_", joint)
-    [use] = (substitution for substitution in experiment.structure.substitutions if substitution.joint == joint)
+    use = experiment.structure.on_beds[joint]
     [servo] = (servo for servo in experiment.structure.servos if servo.joint == joint)
     bed = [*(f"{name} = {head}_{name}" for name in UNITS), *_believed(experiment, use)]
     scale = _scale_of(experiment, joint)

@@ -32,7 +32,7 @@ def check_deck(path: str, experiment: Experiment, joint: str) -> None:
     """Raise Problem E438 where the drive under test cannot take the commands of the deck's bed model, E444 where the
     filter of the rate, or the load's torque constant, differs from the deck's."""
     bench = bench_at(path)
-    _check_told(path, bench, _use(experiment, joint))
+    _check_told(path, bench, experiment.structure.on_beds[joint])
     held = (
         (bench.filter_at, bench.shaft["filter"], "Hz", "f_cut", "the bench filters the rate at", "`filter`"),
         (bench.load_kt_at, bench.load.figures["kt"], "N*m/A", "kt_load", "the bench's load gives", "`kt` of `[load]`"),
@@ -141,10 +141,6 @@ def loop_warning(who: str, gain: float, integral: float, believed: BelievedLoop)
         "what the drive does otherwise the law has to find: else a larger `drift`",
     )
     return Diagnostic("E444", message, help=helps, severity="warning")
-
-
-def _use(experiment: Experiment, joint: str) -> Substitution:
-    return next(substitution for substitution in experiment.structure.substitutions if substitution.joint == joint)
 
 
 def _value(opening: Opening, name: str, default: float | None = None) -> float:

@@ -141,7 +141,7 @@ def _greeted(bed: BedDriver, joint: str, experiment: Experiment, request: CaseRe
 
 def _check_drive(about: About, experiment: Experiment, joint: str) -> None:
     """Raise Problem E438 where a bed's drive is commanded another quantity than in the deck's bed model."""
-    use = next(substitution for substitution in experiment.structure.substitutions if substitution.joint == joint)
+    use = experiment.structure.on_beds[joint]
     commanded = models.find("bed", use.bed, use.place).drive
     if commanded != about.drive:
         message = f"bed `{about.name}` takes a {about.drive}, and `{use.bed}` of joint `{joint}` sends it a {commanded}"

@@ -85,11 +85,6 @@ class ShaftWork:
         return self.load + (np.broadcast_to(inertia, self.shaft.shape) - self.shaft)[:, None] * self.acceleration
 
 
-def substitution_of(experiment: Experiment, joint: str) -> Substitution | None:
-    """The joint's substitution in the deck (its bed and law); None where its motor is on no bed."""
-    return next((use for use in experiment.structure.substitutions if use.joint == joint), None)
-
-
 def servo_of(experiment: Experiment, joint: str) -> ServoUse | None:
     """The joint's servo; None where it has none."""
     return next((use for use in experiment.structure.servos if use.joint == joint), None)
@@ -154,7 +149,7 @@ def _recording(experiment: Experiment, joint: str, names: Sequence[str]) -> Expe
     paths = [f"{joint}.{name}" for name in names]
     known = recordable(structure, paths)
     record = tuple(known[path][0] for path in paths)
-    every = structure.schedule.dynamics if substitution_of(experiment, joint) is None else use.divisor
+    every = use.divisor if joint in structure.on_beds else structure.schedule.dynamics
     schedule = replace(structure.schedule, record=every)
     return replace(experiment, structure=replace(structure, record=record, schedule=schedule))
 
@@ -167,7 +162,7 @@ def drive_of(use: Substitution) -> DriveCommand:
 
 def _names(experiment: Experiment, joint: str) -> tuple[str, ...]:
     """The channels of a joint that the work of its motors is computed from."""
-    use = substitution_of(experiment, joint)
+    use = experiment.structure.on_beds.get(joint)
     if use is None:
         return OF_JOINT
     drive = drive_of(use)
@@ -178,7 +173,7 @@ def _block(experiment: Experiment, joint: str, results: Any, rows: np.ndarray) -
     """The work of a joint's two motors on a bed in these rows of the case table. results: of a run that recorded the
     signals of `_names`."""
     signals = {name: results.signals[f"{joint}.{name}"] for name in _names(experiment, joint)}
-    use = substitution_of(experiment, joint)
+    use = experiment.structure.on_beds.get(joint)
     motor = motor_of(experiment, joint, rows)
     ratio = motor["ratio"][:, None]
     scale = scale_of(experiment, joint, rows)
@@ -226,7 +221,7 @@ def _block(experiment: Experiment, joint: str, results: Any, rows: np.ndarray) -
 
 def scale_of(experiment: Experiment, joint: str, rows: np.ndarray) -> BedScale:
     """The scales between a joint's motor and the one on its bed, each [case, 1]; 1 where the deck has none."""
-    use = substitution_of(experiment, joint)
+    use = experiment.structure.on_beds.get(joint)
     if use is None or not use.scaled:
         return BedScale()
     names = (declared.name for declared in bed_scale.PARAMETERS)
@@ -264,7 +259,7 @@ def parameter(experiment: Experiment, path: str, rows: np.ndarray) -> np.ndarray
 def on_bed(experiment: Experiment, joint: str, *, delay: int) -> Experiment:
     """The experiment with the joint's motor on an emulated motor bed without faults, with all defaults; unchanged where
     the deck has a bed. The law is that of the other joints on beds, where there are some."""
-    if substitution_of(experiment, joint) is not None:
+    if joint in experiment.structure.on_beds:
         return experiment
     from met.substitution import BEDS, LAWS
 

@@ -428,6 +428,11 @@ class Structure:
         """The moving joints that follow no other, in the order of `joints`."""
         return tuple(joint for joint in self.moving if not joint.follows)
 
+    @property
+    def on_beds(self) -> dict[str, Substitution]:
+        """The joints whose motors are on motor beds, by name, each with its substitution."""
+        return {substitution.joint: substitution for substitution in self.substitutions}
+
 
 Design = Literal["", "random", "lhs", "sobol", "saltelli"]
 """The ways in which values of a coordinate are drawn; "" where they are chosen."""
