@@ -43,7 +43,7 @@ def check_failures(
 ) -> None:
     """Report models about servos that are missing, lack the affected part, or are on a bed."""
     servos = {use.joint: use for use in uses}
-    beds = {substitution.joint: substitution.place for substitution in structure.substitutions}
+    beds = structure.on_beds
     joints = {joint.name: joint for joint in structure.moving}
     sound = []
     for failure in _about(scope, structure.environment, "servo_of"):
@@ -56,7 +56,7 @@ def check_failures(
         also = [Label(servo.place, "its servo")] if servo is not None else []
         if wrong is None and joint in beds and model.decoupling is not None:
             wrong = f"`{use.name}` would let go of joint `{joint}`, whose motor is on a bed", "leave it out", place
-            also = [Label(bed, "on a bed")] if (bed := beds[joint]) is not None else []
+            also = [Label(bed, "on a bed")] if (bed := beds[joint].place) is not None else []
         if wrong is not None:
             message, help, mistake_place = wrong
             helps = leave_out(help, use.place) if "leave it out" in help else help
@@ -104,11 +104,10 @@ def _check_follower(
 ) -> None:
     """Report dry friction of a follower that would not act: where no torque of its leader's feels it."""
     leading = leaders(follower.name, {joint.name: joint for joint in structure.moving})
-    on_beds = {substitution.joint for substitution in structure.substitutions}
     reason = "it follows more than one joint" if len(leading) > 1 else ""
     for name in leading:
         servo = servos.get(name)
-        if name in on_beds:
+        if name in structure.on_beds:
             reason = f"the motor of joint `{name}`, which leads it, is on a bed"
         elif servo is not None and servo.parameters is not None and accelerates(servo.bare, servo.parameters):
             label = f"servo `{servo.definition}` ({servo.servo.name})"

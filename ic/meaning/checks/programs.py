@@ -61,7 +61,7 @@ def bed_warning(experiment: Experiment, margin: Margin, where: str) -> Diagnosti
         f"the loop of joint `{margin.joint}` on its bed is unstable with `{margin.law}` at {margin.rate_hz:.12g} Hz: "
         f"r = {r:.3g}, and it is {ends}"
     )
-    place = next(use.place for use in experiment.structure.substitutions if use.joint == margin.joint)
+    place = experiment.structure.on_beds[margin.joint].place
     helps = (f"{remedy(margin)} may help", "`met margin` says it of all cases", where)
     return Diagnostic("D321", message, None if place is None else Label(place), (), helps, "warning")
 

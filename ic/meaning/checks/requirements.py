@@ -172,8 +172,7 @@ def channel_bounds(scope: Scope, structure: Structure, path: str) -> Bounds:
     if expression is not None:
         return _of_formula(expression.formula, lambda channel: channel_bounds(scope, structure, channel))
     joint, _, name = path.partition(".")
-    on_beds = {substitution.joint for substitution in structure.substitutions}
-    uses = [use for use in structure.servos if joint in ("*", use.joint) and use.joint not in on_beds]
+    uses = [use for use in structure.servos if joint in ("*", use.joint) and use.joint not in structure.on_beds]
     if not uses or (joint == "*" and len(uses) < len(structure.moving)):
         return Bounds()
     bounds = _of_joint(scope, uses[0], name)

@@ -59,7 +59,7 @@ class RunParts:
 
     def on_bed(self, use: Use) -> bool:
         """True where the motor of a servo's joint is on a bed, and so no part of the dynamics' step."""
-        return any(substitution.joint == use.joint for substitution in self.structure.substitutions)
+        return use.joint in self.structure.on_beds
 
 
 # What must be free of mistakes for a check to be made
