@@ -46,8 +46,8 @@ def _cause_of(experiment: Experiment, outputs: Mapping[str, float]) -> str:
     joint = moving[int(number)]
     prismatic = joint.kind == "prismatic"
     unit = "kg" if prismatic else "kg m^2"
-    head = f"t = {tick / experiment.structure.schedule.base_hz:g} s: joint {joint.name}: "
-    where = f" ({joint.place.file}:{joint.place.line})" if joint.place else ""
+    head = f"{_head(experiment, tick)}joint {joint.name}: "
+    where = _where(joint.place)
     if failure == SINGULAR and joint.loop is not None:
         return (
             f"{head}loop {joint.loop.name} comes to be stretched or folded flat, or its links no longer meet, so that "
@@ -135,10 +135,10 @@ def _cause_of_balance(experiment: Experiment, number: int, joints: Sequence[Unhe
     if joint not in by_name:
         return f"t = 0 s: joint {joint}: it cannot begin balanced: its servo holds just less than the joint takes."
     weak = by_name[joint]
-    where = f" ({weak.servo.place.file}:{weak.servo.place.line})" if weak.servo.place else ""
     return (
-        f"t = 0 s: joint {joint}: it cannot begin balanced{where}: it takes {weak.wanted:.3g} {weak.unit}, and its "
-        f"servo can hold {weak.holdable:.3g} {weak.unit}. {weak.reason[0].upper()}{weak.reason[1:]}."
+        f"t = 0 s: joint {joint}: it cannot begin balanced{_where(weak.servo.place)}: it takes {weak.wanted:.3g} "
+        f"{weak.unit}, and its servo can hold {weak.holdable:.3g} {weak.unit}. {weak.reason[0].upper()}"
+        f"{weak.reason[1:]}."
     )
 
 
@@ -148,38 +148,35 @@ def _of_guide(experiment: Experiment, joint: str) -> str:
     for use in experiment.structure.guides:
         undefined = models.find("guide", use.model, use.place).undefined
         if joint in use.joints and undefined:
-            where = f" ({use.place.file}:{use.place.line})" if use.place else ""
-            return f"guide `{use.name}`{where}, which it follows, {undefined}; "
+            return f"guide `{use.name}`{_where(use.place)}, which it follows, {undefined}; "
     return ""
 
 
 def _cause_of_payload(experiment: Experiment, number: int, tick: float) -> str:
     """The cause of a failure by one of the payloads in free flight, in words."""
     payload = [flying for flying in experiment.structure.payloads if flying.flies][number]
-    where = f" ({payload.place.file}:{payload.place.line})" if payload.place else ""
     return (
-        f"t = {tick / experiment.structure.schedule.base_hz:g} s: payload {payload.name}: position, rate or "
-        f"acceleration is no longer a finite number{where}. Usual reasons: a step too long for what acts on it (try a "
-        f"faster rate for the dynamics), or a model that divides by zero."
+        f"{_head(experiment, tick)}payload {payload.name}: position, rate or acceleration is no longer a finite "
+        f"number{_where(payload.place)}. Usual reasons: a step too long for what acts on it (try a faster rate for the "
+        f"dynamics), or a model that divides by zero."
     )
 
 
 def _cause_of_sensor(experiment: Experiment, number: int, tick: float) -> str:
     """The cause of a failure by one of the sensors of links, in words."""
     sensor = experiment.structure.sensors[number]
-    where = f" ({sensor.place.file}:{sensor.place.line})" if sensor.place else ""
     return (
-        f"t = {tick / experiment.structure.schedule.base_hz:g} s: sensor {sensor.name}: its filter is no longer a "
-        f"finite number{where}. Usual reasons: a step too long for its `cutoff` (try a faster rate for the dynamics), "
-        f"or numbers that no double holds."
+        f"{_head(experiment, tick)}sensor {sensor.name}: its filter is no longer a finite number"
+        f"{_where(sensor.place)}. Usual reasons: a step too long for its `cutoff` (try a faster rate for the "
+        f"dynamics), or numbers that no double holds."
     )
 
 
 def _cause_of_base(experiment: Experiment, failure: float, tick: float) -> str:
     """The cause of a failure by the free base, in words."""
     base = experiment.structure.base
-    head = f"t = {tick / experiment.structure.schedule.base_hz:g} s: the base: "
-    where = f" ({base.place.file}:{base.place.line})" if base is not None and base.place else ""
+    head = f"{_head(experiment, tick)}the base: "
+    where = _where(base.place) if base is not None else ""
     if failure == SINGULAR and tick > 0.0:
         return (
             f"{head}it moves freely and has no inertia in some direction any more, so its acceleration is "
