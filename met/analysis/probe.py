@@ -32,7 +32,7 @@ def reads(use: ServoUse, values: Mapping[str, Any]) -> frozenset[str] | None:
     seen = Seen(
         graph.input("q"),
         graph.input("qd"),
-        Setpoint(use.command.kind if use.command is not None else "none", graph.input(":asked"), graph.input(":slope")),
+        Setpoint(use.command_kind, graph.input(":asked"), graph.input(":slope")),
         0.0 if parts.continuous else 1.0,
         graph.input(":time"),
         SimpleNamespace(**{state.name: graph.input(state.name) for state in parts.natural}),
@@ -52,15 +52,14 @@ def of_law(use: ServoUse, values: Mapping[str, Any]) -> Hashable:
         for parameter in servo_parts(use).parameters
         if not _is_input(parameter)
     )
-    kind = use.command.kind if use.command is not None else "none"
-    return use.model, use.words, use.continuous, kind, decides
+    return use.model, use.words, use.continuous, use.command_kind, decides
 
 
 def accelerates(use: ServoUse, values: Mapping[str, Any]) -> bool | None:
     """True where the servo prescribes its joint's acceleration, at least at times. None: it could not be recorded."""
     servo, parts, graph = models.find("servo", use.model, use.place), servo_parts(use), Graph()
     q, qd, time, begin = (graph.input(name) for name in ("q", "qd", ":time", ":begin"))
-    joint = JointMotion(q, qd, time, begin, use.command.kind if use.command is not None else "none")
+    joint = JointMotion(q, qd, time, begin, use.command_kind)
     held, states = _named(graph, (*parts.outputs, *parts.integrals)), _named(graph, parts.natural)
     drive = _tried(servo.drive, _parameters(graph, parts.parameters, values), held, states, joint)
     return None if drive is None else drive.given is not None

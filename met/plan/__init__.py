@@ -218,6 +218,11 @@ class ServoUse:
     continuous: bool = keyed("where set", default=False)
     sensors: tuple[SensorUse, ...] = keyed("where set", default=())
 
+    @property
+    def command_kind(self) -> str:
+        """The kind of the joint's command; "none" where it has none."""
+        return "none" if self.command is None else self.command.kind
+
 
 @frozen
 class GuideUse:

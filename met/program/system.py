@@ -117,7 +117,7 @@ class Actuator:
     @property
     def command_kind(self) -> str:
         """Kind of the joint's command; "none" where it has none."""
-        return "none" if self.use.command is None else self.use.command.kind
+        return self.use.command_kind
 
     @property
     def owner(self) -> str:
