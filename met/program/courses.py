@@ -33,18 +33,17 @@ def recorded(experiment: Experiment) -> Formulas:
 
     base = experiment.structure.base
     courses, written = (base.courses, base.place) if base is not None else ((), None)
-    values, rates = values_and_rates("the base", "base", courses, written, number, graph.input(TIME))
-    place, moving = ([part[name] for name in COMPONENTS[:3]] for part in (values, rates))
-    angles, turning = ([part[name] for name in COMPONENTS[3:]] for part in (values, rates))
+    place, moving, angles, turning = pose_and_rates("the base", "base", courses, written, number, graph.input(TIME))
     w = rate_of_rpy(angles, turning)
     vectors = [*rotation_rpy(*angles), place, w, moving, *([_changing(x) for x in vector] for vector in (w, moving))]
     return Formulas.of(graph, [x for vector in vectors for x in vector])
 
 
-def values_and_rates(
+def pose_and_rates(
     whose: str, head: str, courses: Iterable[Course], written: Place | None, number: Read, time: Real
-) -> tuple[dict[str, Real], dict[str, Real]]:
-    """Every component of a pose at a time (s), and its rate; 0 where there is no course.
+) -> tuple[list[Real], list[Real], list[Real], list[Real]]:
+    """A pose that courses give at a time (s): position x y z (m), its rate, angles roll, pitch, yaw (rad), and their
+    rates; 0 where there is no course.
 
     whose  for messages;  head  of the paths of the courses' parameters, which `number` gives
     """
@@ -55,7 +54,9 @@ def values_and_rates(
         owner = f"course `{profile.name}` of `{course.component}` of {whose}"
         p = parameters(owner, f"{head}.{course.component}", profile.parameters, number)
         values[course.component], rates[course.component] = answer(owner, profile.course, p, time)
-    return values, rates
+    place, moving = ([part[name] for name in COMPONENTS[:3]] for part in (values, rates))
+    angles, turning = ([part[name] for name in COMPONENTS[3:]] for part in (values, rates))
+    return place, moving, angles, turning
 
 
 def rate_of_rpy(angles: list[Real], rates: list[Real]) -> Vector:

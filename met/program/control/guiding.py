@@ -26,10 +26,10 @@ from met.dynamics.spatial import (
 from met.guides.guide import Sight, Stance
 from met.integrators.integrator import Motion
 from met.parameter import Parameter
-from met.plan import COMPONENTS, GuideUse
+from met.plan import GuideUse
 from met.program import cells
 from met.program.cells import NamedValues, answer, parameters, returned
-from met.program.courses import rate_of_rpy, values_and_rates
+from met.program.courses import pose_and_rates, rate_of_rpy
 from met.program.motion import base, bodies
 from met.program.motion.base import BaseMotion
 from met.program.system import Actuator, ReadCell, System
@@ -160,7 +160,7 @@ def _wanted(system: System, tape: Tape, use: GuideUse) -> Stance:
     velocity in the world."""
     begun = [tape.read(name) for name in _begun(use)]
     R: Matrix = tuple(tuple(begun[i : i + 3]) for i in (0, 3, 6))  # type: ignore[assignment]
-    values, rates = values_and_rates(
+    place, moving, angles, turning = pose_and_rates(
         f"path of guide `{use.name}`",
         f"guides.{use.name}",
         use.courses,
@@ -168,8 +168,6 @@ def _wanted(system: System, tape: Tape, use: GuideUse) -> Stance:
         lambda path: system.value(path, tape.read),
         tape.time,
     )
-    place, moving = ([part[name] for name in COMPONENTS[:3]] for part in (values, rates))
-    angles, turning = ([part[name] for name in COMPONENTS[3:]] for part in (values, rates))
     p = add((begun[9], begun[10], begun[11]), (place[0], place[1], place[2]))
     v = (moving[0], moving[1], moving[2])
     return Stance(product(rotation_rpy(*angles), R), p, rate_of_rpy(angles, turning), v)
