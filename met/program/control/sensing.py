@@ -116,10 +116,7 @@ def tick(
 
     find   gives the quantity;  state  its states, by channel
     """
-    cases = system.experiment.cases
-    seed = tape.input(SEED) if SEED in cases.noise else float(cases.seed)
-    repeat = tape.input(REPEAT) if REPEAT in cases.noise else 0.0
-    stream, number = Stream(seed, repeat, fitted.path), tape.tick / float(divisor)
+    stream, number = Stream(*seed_and_repeat(system, tape), fitted.path), tape.tick / float(divisor)
     sensed = Sensed(find, period, partial(normal, stream, number))
     p = values(system, fitted, tape.read)
     held = NamedValues(fitted.owner, {part.name: tape.read(f"{fitted.path}.{part.name}") for part in fitted.memory})
@@ -130,6 +127,13 @@ def tick(
         tape.write(f"{fitted.path}.{name}", new)
     tape.write(fitted.path, reading.value)
     return reading.value
+
+
+def seed_and_repeat(system: System, tape: Tape) -> tuple[Real, Real]:
+    """The seed of a case's noise, and the number of its repeat: inputs of the program where cases differ in them."""
+    cases = system.experiment.cases
+    seed = tape.input(SEED) if SEED in cases.noise else float(cases.seed)
+    return seed, tape.input(REPEAT) if REPEAT in cases.noise else 0.0
 
 
 def quantity(fitted: Fitted) -> str:

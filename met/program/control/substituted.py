@@ -20,11 +20,10 @@ from typing import Any
 
 from met.frozen import frozen
 from met.parameter import Parameter
-from met.plan import REPEAT, SEED
 from met.program import cells
 from met.program.cells import NamedValues, answer, parameters, returned
 from met.program.control.rate_drives import Mounted, RateDrives
-from met.program.control.sensing import READING
+from met.program.control.sensing import READING, seed_and_repeat
 from met.program.system import Actuator, System
 from met.servos.motor import Motor, torque
 from met.servos.servo import Seen
@@ -195,9 +194,7 @@ class Substituted:
     def advance(self, tape: Tape) -> None:
         """Advance the emulated motor beds from the last tick to this one."""
         tick = tape.tick / float(self.divisor) - 1.0
-        cases = self.system.experiment.cases
-        seed = tape.input(SEED) if SEED in cases.noise else float(cases.seed)
-        repeat = tape.input(REPEAT) if REPEAT in cases.noise else 0.0
+        seed, repeat = seed_and_repeat(self.system, tape)
         for joint in self.mounted:
             self.advance_bed(tape, joint, self.period, seed=seed, repeat=repeat, tick=tick)
 
