@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from met.backends.reference.plain import PlainTape, follow
+from met.backends.reference.plain import begun
 from met.dynamics.recursion import Solved, reactions, solve
 from met.dynamics.spatial import ZERO, Vector
 from met.frozen import frozen
@@ -66,10 +66,8 @@ class _Along:
         builder = Builder(System(experiment))
         program = builder.program()
         (values,) = inputs(experiment, np.array([case]))
-        tape = PlainTape(program, dict(zip(program.inputs, values, strict=True)), 1)
+        tape = begun(program, dict(zip(program.inputs, values, strict=True)))
         with np.errstate(all="ignore"):
-            follow(tape, program.start)
-            follow(tape, program.tick)
             self.derivative = builder.step.observed(tape).derivative
         self.system, self.parameters, self.read = builder.system, experiment.parameters, tape.read
         self.tree = self.system.tree(tape.read).map_numbers(lambda _, value: float(value))

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from met.backends.reference.plain import PlainTape, follow
+from met.backends.reference.plain import PlainTape, begun
 from met.environments.environment import Environment, Loads
 from met.frozen import frozen
 from met.integrators.integrator import Motion
@@ -54,13 +54,10 @@ def contacts(experiment: Experiment, case: int = 0) -> tuple[Contact, ...]:
         return ()
     builder = Builder(system)
     program = builder.program()
-    values = inputs(experiment, np.array([case]))[0]
-    tape = PlainTape(program, dict(zip(program.inputs, values, strict=True)), 1)
+    tape = begun(program, dict(zip(program.inputs, inputs(experiment, np.array([case]))[0], strict=True)))
     all_contacts = []
     step = experiment.structure.schedule.step
     with np.errstate(all="ignore"):
-        follow(tape, program.start)
-        follow(tape, program.tick)
         arm = builder.step.observed(tape)
         solved = arm.derivative.solved  # before bodies are pushed
         for name, model in stops:

@@ -17,7 +17,7 @@ import numpy as np
 
 from met.analysis.linear.bed_loop import BedLoop, CaseLoop
 from met.analysis.linear.margins import STABLE
-from met.backends.reference.plain import PlainTape, follow
+from met.backends.reference.plain import PlainTape, begun
 from met.frozen import frozen
 from met.plan import Experiment
 from met.program import cells
@@ -197,11 +197,7 @@ class BedExperiment:
 
     def begun(self, case: int) -> PlainTape:
         """A case after its first tick, in plain numbers; the loop for an observer's covariance runs only once."""
-        tape = PlainTape(self.program, self.inputs_of(case), 1)
-        with np.errstate(all="ignore"):
-            follow(tape, self.program.start, settled=np.inf)
-            follow(tape, self.program.tick)
-        return tape
+        return begun(self.program, self.inputs_of(case), settled=np.inf)
 
     def motors(self, tape: PlainTape) -> list[Motor]:
         """The motors of the joints whose motors are on beds, in the arm's order."""

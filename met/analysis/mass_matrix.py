@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 
-from met.backends.reference.plain import PlainTape, follow
+from met.backends.reference.plain import begun
 from met.dynamics.coupling import Ratios
 from met.dynamics.kinematics import fixed_motion, joint_rates, link_motions
 from met.dynamics.spatial import ZERO, Vector, add, apply_symmetric, cross, scale, sub
@@ -106,10 +106,8 @@ def _posed(
 ) -> tuple[np.ndarray, np.ndarray, dict[str, np.ndarray]]:
     """An arm in a case of these inputs: its poses [pose, joint], each once, its mass matrices there, and the angular
     velocity of each lumped link in its axes for each unit velocity, [pose, direction, axis]."""
-    system, tape = builder.system, PlainTape(program, dict(zip(program.inputs, values, strict=True)), 1)
+    system, tape = builder.system, begun(program, dict(zip(program.inputs, values, strict=True)))
     with np.errstate(all="ignore"):
-        follow(tape, program.start)
-        follow(tape, program.tick)
         solved = builder.step.observed(tape).derivative.solved
     start = [float(tape.read(f"{joint.name}.q")) for joint in system.joints]
     low, high, end = np.array([start] * 3)

@@ -80,6 +80,15 @@ def execute(
     return tape.rows, tape.outputs
 
 
+def begun(program: Program, inputs: Mapping[str, float], *, settled: float = 0.0) -> PlainTape:
+    """A case after its first tick, its start included. settled: of the loops of the start, as of `follow`"""
+    tape = PlainTape(program, inputs, 1)
+    with np.errstate(all="ignore"):
+        follow(tape, program.start, settled=settled)
+        follow(tape, program.tick)
+    return tape
+
+
 def follow(tape: PlainTape, body: tuple[Control, ...], *, settled: float = 0.0) -> None:
     """Run the body once, at the tape's tick.
 
@@ -115,4 +124,4 @@ def _near(value: Real, before: Real | None, share: float) -> bool:
     return before is not None and bool(absolute(value - before) <= share * absolute(value))
 
 
-__all__: list[Any] = ["PlainTape", "execute", "follow"]
+__all__: list[Any] = ["PlainTape", "begun", "execute", "follow"]
