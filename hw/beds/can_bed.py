@@ -47,7 +47,7 @@ from hw.ports import Opening, PortKind
 from hw.protocol import messages
 from met.diagnostic import Diagnostic, Problem, did_you_mean, error
 from met.substitution import butterworth
-from met.substitution.bed import DRIVES, DriveCommand
+from met.substitution.bed import DriveCommand
 
 LONGEST_SHARE = 0.8
 """Largest share of a period that the frames of an exchange may take on the bus."""
@@ -276,15 +276,9 @@ class CanBed(BedDriver):
 
     def exchange(self, voltage: float, current: float) -> BedSample | None:
         """Send both drives their torque (or rate), and take what they answer; None where they did not in time."""
-        about, force, scales = self._require_about(), self._in_force, self._about_scales()
-        kind, unit = f"a {self._kind}", DRIVES[self._kind][0]
-        volts = greeting.commanded(voltage, scales.voltage, force.voltage)
-        amperes = greeting.commanded(current, scales.current, force.current)
-        if volts is None or amperes is None:
-            self.stop()
-            if volts is None:
-                raise refusals.no_command(about, kind, voltage, unit, force.voltage * scales.voltage)
-            raise refusals.no_command(about, "a current", current, "A", force.current * scales.current)
+        about, force = self._require_about(), self._in_force
+        volts, amperes = greeting.commanded(self, about, force, voltage, current, drive=self._kind)
+        scales = about.scales
         talk = self._talk
         now = talk.line.now()
         armed = self._state == BedState.ARMED
@@ -504,9 +498,6 @@ class CanBed(BedDriver):
         if self._about is None:
             raise refusals.not_connected(str(self._bench.bus["channel"]))
         return self._about
-
-    def _about_scales(self) -> Scales:
-        return self._require_about().scales
 
     def _drive_command(self, sent: float) -> float:
         """The command for the drive under test: N m, as sent or of an armature at the voltage sent; or rad/s."""

@@ -144,14 +144,8 @@ class EmulatedBed(BedDriver):
     def exchange(self, voltage: float, current: float) -> BedSample | None:
         """Set both commands, and advance the simulated plant by a period. A step of a command that is beyond its slew
         limit is a fault."""
-        about, force, scales = self._require_about(), self._in_force, self._scales
-        volts = greeting.commanded(voltage, scales.voltage, force.voltage)
-        amperes = greeting.commanded(current, scales.current, force.current)
-        if volts is None or amperes is None:
-            self.stop()
-            if volts is None:
-                raise refusals.no_command(about, "a voltage", voltage, "V", force.voltage * scales.voltage)
-            raise refusals.no_command(about, "a current", current, "A", force.current * scales.current)
+        about, force = self._require_about(), self._in_force
+        volts, amperes = greeting.commanded(self, about, force, voltage, current)
         armed = self._state == BedState.ARMED
         if armed:
             since = max(self._since, 1)

@@ -5,9 +5,11 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping
 
-from hw.bed import LIMIT_NAMES, About, Capability, Limits, Scales
+from hw import refusals
+from hw.bed import LIMIT_NAMES, About, BedDriver, Capability, Limits, Scales
 from hw.protocol import messages
 from met.diagnostic import Problem, error
+from met.substitution.bed import DRIVES, DriveCommand
 
 DEADMAN = (0.010, 0.020)
 """Shortest and longest deadman that a bed may have, s (docs/protocol.md, States)."""
@@ -84,13 +86,31 @@ def tighter(about: About, limits: Mapping[str, float]) -> dict[str, int]:
     return {name: counts(value, scale_of[name]) for name, value in limits.items()}
 
 
-def commanded(value: float, scale: float, most: int) -> int | None:
-    """A command as whole counts, the nearest ones; None where it is no finite number, or beyond the limit in force."""
-    exact = value / scale
-    if exact - exact != 0.0:
-        return None
-    nearest = round(exact)
-    return nearest if -most <= nearest <= most else None
+def commanded(
+    bed: BedDriver,
+    about: About,
+    limits: messages.LimitsAnswer,
+    voltage: float,
+    current: float,
+    *,
+    drive: DriveCommand = "voltage",
+) -> tuple[int, int]:
+    """Both commands to a bed, for its drive and for the load's current (A), as whole counts, the nearest ones. Stops
+    the bed and raises Problem E408 where one is no finite number, or beyond its limit in force.
+
+    limits  in force, in counts;  drive: what `voltage` is, for the message
+    """
+    scales, counted = about.scales, []
+    for what, value, scale, most, unit in (
+        (f"a {drive}", voltage, scales.voltage, limits.voltage, DRIVES[drive][0]),
+        ("a current", current, scales.current, limits.current, "A"),
+    ):
+        exact = value / scale
+        if not (math.isfinite(exact) and -most <= round(exact) <= most):
+            bed.stop()
+            raise refusals.no_command(about, what, value, unit, most * scale)
+        counted.append(round(exact))
+    return counted[0], counted[1]
 
 
 def ticks(about: About, period: float) -> int:

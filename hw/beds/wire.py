@@ -142,8 +142,7 @@ class WireBed(BedDriver):
     def exchange(self, voltage: float, current: float) -> BedSample | None:
         """Send both commands in counts of the bed's scales; None where no answer comes within `patience`."""
         about = self._require_about()
-        volts = self._counts("a voltage", voltage, about.scales.voltage, self._in_force.voltage, "V")
-        amperes = self._counts("a current", current, about.scales.current, self._in_force.current, "A")
+        volts, amperes = greeting.commanded(self, about, self._in_force, voltage, current)
         command = (
             messages.StepMessage(volts, amperes, self._step) if self._step else messages.DriveMessage(volts, amperes)
         )
@@ -155,14 +154,6 @@ class WireBed(BedDriver):
             return sample
         self.stop()
         return replace(sample, state=BedState.STOPPED, faults=sample.faults | Fault.OTHER_MASTER)
-
-    def _counts(self, what: str, value: float, scale: float, most: int, unit: str) -> int:
-        """A command in counts. Stops the bed and raises Problem E408 where it is no number or beyond its limit."""
-        counts = greeting.commanded(value, scale, most)
-        if counts is None:
-            self.stop()
-            raise refusals.no_command(self._require_about(), what, value, unit, most * scale)
-        return counts
 
     def read(self) -> BedSample:
         self._require_about()
