@@ -71,7 +71,6 @@ MOST_TOLD, MOST_RATE = (1 << 15) - 1, (1 << 31) - 1
 """Largest torque and velocity that target torque and velocity can tell, in their units."""
 
 OFF, SHUT_DOWN, SWITCH_ON, ENABLE, RESET = 0x00, 0x06, 0x07, 0x0F, 0x80
-_TURN = 2.0 * math.pi
 
 
 def _upload(which: tuple[int, int]) -> bytes:
@@ -127,14 +126,14 @@ class Cia402Drive(CanDrive):
         self._rate_unit = RATE_UNITS[unit & 0xFFFFFF] * 10.0**ten
         self._rated = 1e-3 * self._read(talk, RATED, "<I")
         most = 1e-3 * self._rated * self._most(talk)
-        rate = _TURN / 60.0 * self._read(talk, SPEED, "<I")
+        rate = math.tau / 60.0 * self._read(talk, SPEED, "<I")
         steps, turns = self._read(talk, STEPS, "<I"), self._read(talk, TURNS, "<I")
         if not all(figure > 0.0 for figure in (self._rated, most, rate, steps, turns)):
             raise self.wrong("a limit or a unit of its is 0", "objects 6072h, 6076h, 6080h and 608Fh")
         if rate > MOST_RATE * self._rate_unit:
             helps = "set object 60A9h to thousandths of a turn a minute, 0xFDB44700"
             raise self.wrong(f"its largest speed, {rate:.4g} rad/s, is more than 32 bits hold in its unit", helps)
-        self._step = _TURN * turns / steps
+        self._step = math.tau * turns / steps
         self.steps = self._step, self._rate_unit
         self._set_up(talk)
         talk.send(self.idle())

@@ -291,6 +291,12 @@ class CanDrive(ABC):
         """True where it drives, and tells no error."""
         return self.state == DriveState.DRIVING and not self.errors
 
+    @property
+    def bears(self) -> float:
+        """The largest torque that the bench bears from this drive, N m."""
+        figures = self.entry.figures
+        return figures["torque_max"] if self.entry.role == "drive" else figures["kt"] * figures["current_max"]
+
     def own(self, value: float) -> float:
         """A quantity of the shaft in the drive's own sense, or the other way round."""
         return self.sense * value

@@ -53,8 +53,6 @@ REGISTER_MAP = 5
 CONTROL_HZ = 15000.0
 """Least rate of the drive's own control, Hz."""
 
-_TURN = 2.0 * math.pi
-
 
 def number(value: int) -> bytes:
     """A register's number as it goes over the bus: seven bits a byte, the lowest first."""
@@ -148,9 +146,7 @@ class MoteusDrive(CanDrive):
     def __init__(self, entry: DriveEntry) -> None:
         super().__init__(entry)
         self._about: dict[int, float] = {}
-        figures = entry.figures
-        self._most = figures["torque_max"] if entry.role == "drive" else figures["kt"] * figures["current_max"]
-        self._watchdog = figures["watchdog"]
+        self._watchdog = entry.figures["watchdog"]
 
     def greet(self, talk: Talk) -> DriveFacts:
         """Check the model and register map of this moteus, and stop it. Raises Problem E402 to E404."""
@@ -181,7 +177,7 @@ class MoteusDrive(CanDrive):
 
     def command(self, value: float) -> Sequence[CanFrame]:
         """The frame that commands a torque, N m, for the time of the watchdog, and asks for the state."""
-        torque = (self.own(value), 0.0, 0.0, self._most)  # and no part of its gains
+        torque = (self.own(value), 0.0, 0.0, self.bears)  # and no part of its gains
         data = written(INT8, MODE, DRIVING) + written(FLOAT, TARGET, math.nan) + written(FLOAT, TORQUE, *torque)
         data += written(FLOAT, VALID_FOR, self._watchdog) + written(FLOAT, INTEGRAL_SCALE, 0.0)
         return (self._frame(data + _STATE),)
@@ -222,13 +218,13 @@ class MoteusDrive(CanDrive):
         if not all(math.isfinite(value) for value in values):
             return False
         mode, position, velocity, supply, fault = values
-        if self.has_said((position, velocity), _TURN * velocity, frame.time):
+        if self.has_said((position, velocity), math.tau * velocity, frame.time):
             return False
         self.supply = supply
         power = registers.get(POWER, math.nan)
         self.power = power if math.isfinite(power) else None
         self._state(int(mode), int(fault), frame.time)
-        self.reading = DriveReading(frame.time, self.own(_TURN * position), self.own(_TURN * velocity))
+        self.reading = DriveReading(frame.time, self.own(math.tau * position), self.own(math.tau * velocity))
         return True
 
     def _state(self, mode: int, fault: int, time: float) -> None:

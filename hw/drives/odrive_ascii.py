@@ -209,8 +209,10 @@ class OdriveAsciiDrive(OdriveAxis):
         value = _number(answer)
         if path in (STATE, ACTIVE, REASON):
             self._judge(path, value, frame.time)
-        elif path in (VOLTAGE, CURRENT) and math.isfinite(value):
-            self._supplied(path, value)
+        elif path == VOLTAGE and math.isfinite(value):
+            self.supply = value
+        elif path == CURRENT and math.isfinite(value) and self.supply is not None:
+            self.power = self.supply * value
         elif path == self._checks.open_question:
             self._check(value, frame.time)
         return True
@@ -230,12 +232,6 @@ class OdriveAsciiDrive(OdriveAxis):
         self._state = None if value == CLOSED_LOOP else int(value)
         if self._state is None:  # an axis with errors does not drive
             self._says(0, CLOSED_LOOP, time)
-
-    def _supplied(self, path: str, value: float) -> None:
-        if path == VOLTAGE:
-            self.supply = value
-        elif self.supply is not None:
-            self.power = self.supply * value
 
 
 def _number(text: str) -> float:

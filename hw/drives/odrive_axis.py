@@ -126,7 +126,7 @@ class OdriveAxis(CanDrive):
         The largest torque is set whatever it is told, for it stays until the drive is switched off: a bench that is
         told torques would else keep that of the one that was told rates before.
         """
-        bears = self._bears
+        bears = self.bears
         for path, value in (
             (WATCHDOG_TIMEOUT, self.entry.figures["watchdog"]),
             (WATCHDOG_ENABLED, True),
@@ -153,12 +153,6 @@ class OdriveAxis(CanDrive):
         self._checks.begin(commanded, {path: self._read(talk, path) for path in paths if path not in commanded})
         most = kt * current
         return DriveFacts(firmware, hardware, watchdog, most, rate, CONTROL_HZ, supply_max=supply, rate_loop=loop)
-
-    @property
-    def _bears(self) -> float:
-        """The largest torque that the bench bears from this drive, N m."""
-        figures = self.entry.figures
-        return figures["torque_max"] if self.entry.role == "drive" else figures["kt"] * figures["current_max"]
 
     def _rate_loop(self, talk: Talk) -> tuple[float, float]:
         """Read the gains of the drive's rate loop, N m s/rad and N m/rad."""

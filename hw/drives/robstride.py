@@ -281,32 +281,28 @@ class RobstrideDrive(CanDrive):
         elif kind == FEEDBACK and above >> 6 <= RUNNING:
             version = data.startswith(VERSION + b"\x56") and above >> 6 != RUNNING and self._version is None
             at_end = data[:2] in (b"\0\0", b"\xff\xff")  # where the angle of older firmware stays
-            if not (version or at_end) and self.has_said(data[:4], self._rate_of(data), frame.time):
+            angle, rate_count = struct.unpack_from(">HH", data)
+            rate = value_of(rate_count, self._rate_max, STEPS_16)
+            if not (version or at_end) and self.has_said(data[:4], rate, frame.time):
                 return False
             self._state(above >> 6, above & 0x3F, frame.time)
             if version:
                 self._version = data[3:7]
                 return True
-            angle, rate = struct.unpack_from(">HH", data)
             self._read_shaft(angle, rate, frame.time)
         else:
             return False
         return True
 
-    def _rate_of(self, data: bytes) -> float:
-        """The rate of an answer, rad/s, in the drive's own sense."""
-        return value_of(data[2] << 8 | data[3], self._rate_max, STEPS_16)
-
-    def _read_shaft(self, angle: int, rate: int, time: float) -> None:
-        """Take angle and rate, in counts. One that turns and whose angle stays at an end of its range has failed: the
-        angle of older firmware does not begin anew there."""
-        turned = value_of(rate, self._rate_max, STEPS_16)
+    def _read_shaft(self, angle: int, rate: float, time: float) -> None:
+        """Take the angle, in counts, and the rate, rad/s in the drive's own sense. One that turns and whose angle stays
+        at an end of its range has failed: the angle of older firmware does not begin anew there."""
         at_end, before = angle in (0, STEPS_16), self._last
         self._last = angle, time
-        if at_end and before[0] == angle and abs(turned) * (time - before[1]) > STAYS * 2.0 * ANGLE_MAX / STEPS_16:
+        if at_end and before[0] == angle and abs(rate) * (time - before[1]) > STAYS * 2.0 * ANGLE_MAX / STEPS_16:
             self.errors, self.starved = "its angle stays at the end of its range", False
             self.state = self.state if self.state == DriveState.DRIVING else DriveState.FAILED
-        self.reading = DriveReading(time, self.own(value_of(angle, ANGLE_MAX, STEPS_16)), self.own(turned))
+        self.reading = DriveReading(time, self.own(value_of(angle, ANGLE_MAX, STEPS_16)), self.own(rate))
 
     def _state(self, mode: int, faults: int, time: float) -> None:
         """Take the mode and the faults of an answer as the drive's state. time: of the frame, s"""
