@@ -167,9 +167,7 @@ def mass_matrices(tree: Tree, q: np.ndarray, rotor: Sequence[float], spin: Seque
     """
     columns, qd, base = _unit_velocities(tree, q)
     shape = (len(q), _size(tree))
-    rates = list(
-        joint_rates(tree, [joint.at(position) for joint, position in zip(tree.joints, columns, strict=True)], qd, base)
-    )
+    rates = list(joint_rates(tree, tree.transforms(columns), qd, base))
     bodies = [joint.body for joint in tree.joints]
     matrices = np.zeros((*shape, shape[1]))
     for i, joint in enumerate(tree.joints):

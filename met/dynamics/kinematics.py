@@ -80,7 +80,7 @@ def link_motions(
     base_velocity: tuple[Vector, Vector] = (ZERO, ZERO),
 ) -> dict[str, LinkMotion]:
     """Every link by name. base: the base frame in the world; its angular and linear velocity in its own axes."""
-    steps = tuple(joint.at(q[i]) for i, joint in enumerate(tree.joints))
+    steps = tree.transforms(q)
     poses = joint_poses(tree, steps, base)
     rates = joint_rates(tree, steps, qd, base_velocity)
     root_pose, root_rates = compose(base, tree.base), fixed_motion(base_velocity, tree.base)
@@ -129,7 +129,7 @@ def link_acceleration(
     All products of velocities are included, so it holds for any motion. base_rate, base_acceleration: the base frame's
     angular velocity; its angular acceleration and that of its origin; in its own axes.
     """
-    steps = tuple(joint.at(q[i]) for i, joint in enumerate(tree.joints))
+    steps = tree.transforms(q)
     frame = tree.frames[link]
     way: list[int] = []
     i = frame.joint
@@ -159,7 +159,7 @@ def jacobian(
     """For each joint, the angular velocity of the link and the velocity of a point of it (link frame, m), in world
     axes, for each unit of that joint's rate. Zeros for joints that do not carry the link. base: as in `link_motions`.
     """
-    steps = tuple(joint.at(q[i]) for i, joint in enumerate(tree.joints))
+    steps = tree.transforms(q)
     poses = joint_poses(tree, steps, base)
     frame = tree.frames[link]
     columns: list[tuple[Vector, Vector]] = [(ZERO, ZERO)] * len(tree.joints)
@@ -190,7 +190,7 @@ def base_answers(tree: Tree, q: Sequence[Real], base: Pose = HERE) -> tuple[tupl
     """
     assert tree.floating is not None
     about_origin = Pose(base.R, ZERO)  # everything about the base's origin
-    steps = tuple(joint.at(q[i]) for i, joint in enumerate(tree.joints))
+    steps = tree.transforms(q)
     poses = joint_poses(tree, steps, about_origin)
     carried = [rigid_raise(joint.body, pose) for joint, pose in zip(tree.joints, poses, strict=True)]
     whole = rigid_raise(tree.floating.body, compose(about_origin, tree.base))
@@ -262,7 +262,7 @@ def energy(
     momenta  by joint: angular momentum about its axis of what turns there in the link before it, against that link,
              kg m^2/s; None: none
     """
-    steps = tuple(joint.at(q[i]) for i, joint in enumerate(tree.joints))
+    steps = tree.transforms(q)
     bodies = [joint.body for joint in tree.joints]
     poses = list(joint_poses(tree, steps, base))
     rates = list(joint_rates(tree, steps, qd, base_velocity))

@@ -178,7 +178,7 @@ def solve(
     spin = (0.0,) * n if spin is None else spin
     free_rotors = (None,) * n if free_rotors is None else free_rotors
     modes = tuple(_truth(m) for m in mode) if isinstance(mode, Sequence) else (_truth(mode),) * n
-    steps = tuple(joint.at(q[i]) for i, joint in enumerate(joints))
+    steps = tree.transforms(q)
     base_w, base_wd, base_a = _base(tree, gravity, base_acceleration, base_rate if velocity_products else ZERO)
 
     # Base to tips: angular velocities and the accelerations that are products of velocities, c = (c_w, c_a), in the

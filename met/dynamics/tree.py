@@ -24,7 +24,7 @@ from dataclasses import fields, is_dataclass, replace
 from typing import Any, Literal
 
 from met.dynamics.floating import Floating
-from met.dynamics.joints import Joint, X, Z
+from met.dynamics.joints import Joint, JointTransform, X, Z
 from met.dynamics.spatial import (
     HERE,
     IDENTITY,
@@ -126,6 +126,10 @@ class Tree:
               fixed to the base where the base is
         """
         return _Builder(bodies, moving).tree(free=free).map_numbers(lambda _, value: value)
+
+    def transforms(self, q: Sequence[Real]) -> tuple[JointTransform, ...]:
+        """The transform of each joint at its position, q in rad (prismatic: m)."""
+        return tuple(joint.at(q[i]) for i, joint in enumerate(self.joints))
 
     def map_numbers(self, function: Callable[[str, Real], Real]) -> Tree:
         """The tree with function(name, value) for every number that a case may vary.
