@@ -414,12 +414,12 @@ def _check_bodies(experiment: Experiment, where: str) -> None:
             tests.append((f"{head}.inertia", inertia, _is_inertia, "a principal moment is below 0: no body has that"))
         if payload.grappled and payload.released:
             times = [f"{head}.grapple", f"{head}.release"]
-            tests.append((times[1], times, _in_order, "it is not after `grapple`"))
+            tests.append((times[1], times, relations.is_less, "it is not after `grapple`"))
     for joint in structure.moving:
         axis = [f"{joint.name}.axis.{letter}" for letter in "xyz"]
         tests.append((f"{joint.name}.axis", axis, _is_axis, "its length should be 1"))
         ends = [f"{joint.name}.q_min", f"{joint.name}.q_max"]
-        tests.append((ends[0], ends, _in_order, "it should be less than `q_max`"))
+        tests.append((ends[0], ends, relations.is_less, "it should be less than `q_max`"))
         for path in (f"{joint.name}.qd_max", f"{joint.name}.tau_max"):
             tests.append((path, [path], _is_some, "it should be above 0"))
     if structure.free:
@@ -474,10 +474,6 @@ def _is_some(values: np.ndarray) -> np.ndarray:
 def _is_axis(values: np.ndarray) -> np.ndarray:
     with np.errstate(all="ignore"):
         return np.abs(np.sqrt((values * values).sum(axis=1)) - 1.0) <= ROUNDING
-
-
-def _in_order(values: np.ndarray) -> np.ndarray:
-    return np.asarray(values[:, 0] < values[:, 1])
 
 
 def _is_solid(values: np.ndarray) -> np.ndarray:

@@ -61,7 +61,7 @@ def tests(
                 yield path, [f"{path}.{axis}" for axis in "xyz"], _is_direction, "it has no direction"
             if parameter.less_than:
                 other = f"{prefix}.{parameter.less_than}"
-                yield path, [path, other], _is_less, f"it should be less than `{parameter.less_than}`"
+                yield path, [path, other], is_less, f"it should be less than `{parameter.less_than}`"
 
 
 def _check_list(
@@ -85,7 +85,8 @@ def _is_direction(values: np.ndarray) -> np.ndarray:
     return np.asarray((size > 0.0) & (size < math.inf))
 
 
-def _is_less(values: np.ndarray) -> np.ndarray:
+def is_less(values: np.ndarray) -> np.ndarray:
+    """True for the cases, [case, 2], whose first number is below the second."""
     return np.asarray(values[:, 0] < values[:, 1])
 
 
