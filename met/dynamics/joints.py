@@ -158,7 +158,10 @@ class JointTransform(NamedTuple):
 
     def pose(self) -> Pose:
         """The child frame in the parent frame."""
-        R: Matrix = tuple(self._raise_axis(e) for e in ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)))  # type: ignore
+        R: Matrix = tuple(  # type: ignore[assignment]
+            raise_vector(Z, self.swing, raise_vector(X, self.twist, raise_vector(Z, self.turn, axis)))
+            for axis in ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+        )
         R = ((R[0][0], R[1][0], R[2][0]), (R[0][1], R[1][1], R[2][1]), (R[0][2], R[1][2], R[2][2]))
         slid = raise_vector(X, self.twist, (0.0, 0.0, self.slide))
         return Pose(R, raise_vector(Z, self.swing, add(self.offset, slid)))
@@ -167,9 +170,6 @@ class JointTransform(NamedTuple):
         """The child frame in the frame in which the parent frame has the pose `outer`."""
         own = self.pose()
         return Pose(product(outer.R, own.R), add(outer.p, turn_vector(outer.R, own.p)))
-
-    def _raise_axis(self, e: Vector) -> Vector:
-        return raise_vector(Z, self.swing, raise_vector(X, self.twist, raise_vector(Z, self.turn, e)))
 
     def _raise_offset(self, moment: Vector, force: Vector) -> tuple[Vector, Vector]:
         for axis in (X, Y, Z):

@@ -327,7 +327,7 @@ class StepPhases:
             tape.read,
             y=y,
             held=held,
-            friction=self._friction(tape),
+            friction={part.name: tape.read(cells.FRICTION_MODE(part.name)) for part in self.sticking},
             time=self._time(tape, fraction),
             begin=tape.read("instant"),
             part=tape.part,
@@ -468,9 +468,6 @@ class StepPhases:
         y = cells.state(tape, self.coordinates, self.states, copy, self._followers)
         y = self.system.followed(tape.read, y)
         return y if copy == STAGE else bodies.with_zero_turn(self.system, y)
-
-    def _friction(self, tape: Tape) -> dict[str, Real]:
-        return {part.name: tape.read(cells.FRICTION_MODE(part.name)) for part in self.sticking}
 
     def _sliding(self, tape: Tape) -> list[Real | None]:
         """Friction modes for crossings: zero, so that it never crosses, where a case has no friction."""
