@@ -39,7 +39,8 @@ def put_first(process: int) -> None:
 
 
 def _refusal(lacking: str, reason: OSError, limit: str) -> str:
-    """What the host does without, in words, with the line of limits.conf that allows it, or the system that has it."""
+    """The measure that the host does without, in words, with the line of limits.conf that allows it, or the system
+    that has it."""
     if reason.errno == errno.ENOSYS:
         return f"{lacking} (this system has no such call): exchanges may be late; drive motors from Linux"
     return f"{lacking} ({str(reason.strerror).lower()}): exchanges may be late; `@GROUP - {limit}` allows it"

@@ -90,7 +90,7 @@ def words(faults: Fault) -> str:
 
 
 def remedies(faults: Fault) -> list[str]:
-    """What to do about each of these faults, in words."""
+    """The remedy for each of these faults, in words."""
     return [_FAULTS[fault][1] for fault in Fault if fault in faults]
 
 

@@ -138,7 +138,7 @@ _ROUNDINGS = tuple(Context(prec=digits) for digits in (15, 16, 17))
 
 @lru_cache
 def _units_in_si(measure: Measure) -> Decimal:
-    """How many of this unit one SI unit is."""
+    """The number of this unit that makes one SI unit."""
     exact = 1 / measure.exact
     return _EXACTLY.divide(Decimal(exact.numerator), Decimal(exact.denominator))
 

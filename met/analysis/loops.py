@@ -259,7 +259,7 @@ def rates_of(loops: SampledLoops, eigenvalues: np.ndarray, *, ticks: bool) -> np
 def parts_in(
     loops: SampledLoops, lane: int, gains: Gains | None, eigenvalue: complex, *, ticks: bool
 ) -> dict[str, float]:
-    """How much the gain of each law matters to a mode: the derivative of its eigenvalue, as a size, by joint; of laws
+    """The weight of the gain of each law in a mode: the derivative of its eigenvalue, as a size, by joint; of laws
     that tick where the eigenvalue is that of a frame, else of all. One factorisation, where all eigenvectors would cost
     as much as many spectra."""
     from scipy.linalg import lu_factor, lu_solve

@@ -87,6 +87,7 @@ class Margin:
 
     @property
     def too_heavy(self) -> bool:
+        """True where the loop is unstable because the arm is too heavy."""
         return self.limit is not None and 0.0 < self.limit <= self.together
 
     @property
@@ -264,7 +265,7 @@ def _around(known: _Known, own: tuple[float, float], searched: tuple[float, floa
         ranges = stretches(loop, looked_at, grow(loop, looked_at))
 
     def near(stretch: tuple[float, float | None]) -> float:
-        """How near a range of r is to the arm's own, from 0 to 1 (within)."""
+        """The nearness of a range of r to the arm's own, from 0 to 1 (within)."""
         lower, limit = stretch
         if own[1] <= lower:
             return own[1] / lower if lower > 0.0 else 1.0

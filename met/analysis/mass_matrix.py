@@ -47,7 +47,7 @@ LARGER = tuple(digits * 10.0 ** (power - 1) for power in range(-9, 4) for digits
 
 @frozen
 class Definiteness:
-    """Whether mass matrices are positive definite.
+    """The answer to whether the mass matrices of some cases are positive definite.
 
     poses    number of poses that were looked at, in all cases
     least    the least eigenvalue at any of them, of the matrix scaled to ones, or -1, on its diagonal

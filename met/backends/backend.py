@@ -57,7 +57,7 @@ class Kernel(Protocol):
 
     @property
     def cached(self) -> bool:
-        """Whether the kernel was in the cache, rather than compiled now."""
+        """True where the kernel was in the cache, rather than compiled now."""
 
     @property
     def processor(self) -> str:

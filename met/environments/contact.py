@@ -48,7 +48,8 @@ def show(p: Any, world: World) -> Mapping[str, Any]:
 
 
 def touch(p: Any, world: World) -> Touch:
-    """Where and how fast two bodies touch, or would: normal, depth (m), approach (m/s), in the world."""
+    """The place at which two bodies touch, or would, and their motion there: normal, depth (m), approach (m/s), in the
+    world."""
     way = sub(world.position(p.link, p.at), world.position(p.to, p.to_at))
     if p.surface == "plane":
         normal = world.to_world(p.to, scale(1.0 / sqrt(dot(p.normal, p.normal)), p.normal))
@@ -67,7 +68,7 @@ def touch(p: Any, world: World) -> Touch:
 
 
 def lasts(p: Any, mass: float, rate: float) -> float:
-    """How long a contact lasts that takes no energy, s, of bodies of this reduced mass, kg, that meet at this rate,
+    """The duration of a contact that takes no energy, s, of bodies of this reduced mass, kg, that meet at this rate,
     m/s."""
     if p.law == "linear":
         return math.pi * math.sqrt(mass / p.stiffness)

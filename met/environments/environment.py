@@ -42,7 +42,7 @@ class World(Protocol):
     links: tuple[str, ...]
 
     def slides(self, joint: str) -> bool:
-        """Whether a joint is prismatic."""
+        """True for a prismatic joint."""
 
     def q(self, joint: str) -> Real:
         """A joint's position, rad (m)."""
@@ -107,7 +107,7 @@ class Loads:
 
 @frozen
 class Touch:
-    """Where two bodies touch, or would, in the world's axes.
+    """The place at which two bodies touch, or would, in the world's axes.
 
     normal  unit vector along which they press the first apart from the other
     depth   of one in the other, m; below 0, the gap between them

@@ -176,8 +176,8 @@ class Held:
 
 
 def beyond(last: Real, d: Real, c: Real, b: Real, a: Real) -> Real:
-    """How far the signal may be above the sample c, of five from a to the last one, at most one sample away; 0 where a
-    neighbour is above it, or one of the five is not finite."""
+    """The most by which the signal may be above the sample c, of five from a to the last one, at most one sample away;
+    0 where a neighbour is above it, or one of the five is not finite."""
     rise, rise_before, fall, fall_after = c - b, b - a, c - d, d - last
 
     def meeting(up: Real, down: Real, other: Real) -> Real:

@@ -366,6 +366,7 @@ def _is_finite(default: object, values: np.ndarray) -> np.ndarray:
 
 
 def _is_whole(values: np.ndarray) -> np.ndarray:
+    """True for the cases, [case, 1], with a whole number."""
     return np.asarray(values[:, 0] == np.rint(values[:, 0]))
 
 
@@ -468,10 +469,12 @@ def _is_mass(values: np.ndarray) -> np.ndarray:
 
 
 def _is_some(values: np.ndarray) -> np.ndarray:
+    """True for the cases, [case, any], whose numbers have a sum above 0."""
     return np.asarray(values.sum(axis=1) > 0.0)
 
 
 def _is_axis(values: np.ndarray) -> np.ndarray:
+    """True for the cases, [case, 3], with a vector of length 1, but for rounding."""
     with np.errstate(all="ignore"):
         return np.abs(np.sqrt((values * values).sum(axis=1)) - 1.0) <= ROUNDING
 
@@ -487,6 +490,7 @@ def _is_solid(values: np.ndarray) -> np.ndarray:
 
 
 def _are_finite(values: np.ndarray) -> np.ndarray:
+    """True for the cases, [case, any], all of whose numbers are finite."""
     return np.asarray(np.isfinite(values).all(axis=1))
 
 

@@ -111,7 +111,7 @@ class TuningStart:
 
 @frozen
 class Confirmation:
-    """How the design of a tuning came out in cases that did not choose it.
+    """The outcome of the design of a tuning in cases that did not choose it.
 
     against  the sweep that drew them
     failed   cases that failed;  missed: others that miss a requirement, or have no value of one or of the goal

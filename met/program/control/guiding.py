@@ -156,8 +156,8 @@ def _begun(use: GuideUse) -> list[str]:
 
 
 def _wanted(system: System, tape: Tape, use: GuideUse) -> Stance:
-    """Where the guide's path is at the present time and how it moves, counted from the initial guided frame; pose and
-    velocity in the world."""
+    """Pose and velocity of a guide's path at the present time, in the world; the path is counted from the guided frame
+    as it begins."""
     begun = [tape.read(name) for name in _begun(use)]
     R: Matrix = tuple(tuple(begun[i : i + 3]) for i in (0, 3, 6))  # type: ignore[assignment]
     place, moving, angles, turning = pose_and_rates(
