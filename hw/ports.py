@@ -78,11 +78,6 @@ class Opening:
         return None if self.port.transcript is None else TranscriptFile(self.port.transcript)
 
 
-def as_requested(name: str, requested: bool) -> bool:
-    """The `lock_step` of a port whose bed may be either: the user's choice by `--lock-step`."""
-    return requested
-
-
 @frozen(kw_only=True)
 class PortKind:
     """The declaration of a driver: which ports are its own, and how a bed there is opened.
@@ -95,7 +90,7 @@ class PortKind:
     needs       parameters that the deck's bed model must declare, besides `met.substitution.bed.PARAMETERS`
     check       (address, experiment, joint) raises Problem where the bed there cannot be that of a deck
     lock_step   (port, requested) -> True where the bed has no time of its own and waits for each exchange; requested:
-                whether the user says `--lock-step`
+                whether the user says `--lock-step`, which decides it unless a driver says otherwise
     replays     True where the bed answers from a transcript, so that only what made it can be asked again
     recognizes  (port) -> True where a port is of this kind that begins with no scheme
     bench       (address) -> what tells the bench there from another, in words by name, as it is now; empty where the
@@ -109,7 +104,7 @@ class PortKind:
     simulated: bool = False
     needs: tuple[Parameter, ...] = ()
     check: Callable[[str, Experiment, str], None] = lambda address, experiment, joint: None
-    lock_step: Callable[[str, bool], bool] = as_requested
+    lock_step: Callable[[str, bool], bool] = lambda name, requested: requested
     replays: bool = False
     recognizes: Callable[[str], bool] = lambda name: False
     bench: Callable[[str], Mapping[str, str]] = lambda address: {}

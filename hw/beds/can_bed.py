@@ -596,6 +596,5 @@ PORT = PortKind(
     doc=f"Two drives on a CAN bus or on serial lines, as the file says; their dialects: {', '.join(DIALECTS)}.",
     open=_opened_port,
     check=can_deck.check_deck,
-    lock_step=lambda name, requested: requested,
     bench=lambda address: can_deck.bench_at(address).identity,
 )
