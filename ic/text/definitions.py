@@ -8,7 +8,7 @@ from ic.text.lexer import BAD, COMMAND_LINE, NAME, NUMBERS, PASTE, SPACE, Token,
 from ic.text.limits import LONGEST_NAME, MOST_MACRO_BODY, Findings
 from ic.text.substitute import OPTIONAL, REST, Macro, closing
 from met import units
-from met.diagnostic import Help, Label, write
+from met.diagnostic import Help, Label, Problem, error, write
 
 CLOCK = ("__DATE__", "__TIME__", "__TIMESTAMP__")
 LONGEST_UNIT = 200  # tokens
@@ -16,77 +16,78 @@ COUNTER = "__COUNTER__"  # 0, 1, 2, ...: another number at each use
 PREDEFINED = ("__FILE__", "__LINE__", COUNTER, "defined", REST, OPTIONAL, *CLOCK)
 
 
-def checked_definition(tokens: list[Token], is_macro: Callable[[str], bool], findings: Findings) -> list[Token] | None:
-    """The body of a sound definition; None, and a message, for another. is_macro: whether there is one of a name."""
-    name, tell = tokens[0], findings.error
+def checked_definition(tokens: list[Token], is_macro: Callable[[str], bool], findings: Findings) -> list[Token]:
+    """The body of the `#define` whose tokens these are, from the macro's name on. Stray characters in it are reported.
+
+    is_macro: whether there is a macro of a name. Raises Problem D007, D011, D018 or D019 where the definition is not
+    sound.
+    """
+    name = tokens[0]
     if name.kind != NAME:
-        tell(
-            "D007",
-            f"a macro's name cannot be `{name.text[:LONGEST_NAME]}`",
-            name.place,
-            help="a name is letters, digits and `_`, and begins with no digit",
+        raise Problem(
+            error(
+                "D007",
+                f"a macro's name cannot be `{name.text[:LONGEST_NAME]}`",
+                name.place,
+                help="a name is letters, digits and `_`, and begins with no digit",
+            )
         )
-        return None
     if name.text in PREDEFINED:
-        tell("D007", f"`{name.text}` cannot be a macro of yours", name.place, help="choose another name")
-        return None
+        raise Problem(
+            error("D007", f"`{name.text}` cannot be a macro of yours", name.place, help="choose another name")
+        )
     if units.is_unit(name.text):
-        word = units.UNITS[name.text].word
-        help = f"it would replace the unit in every quantity after it: `2 {name.text}` would lose its unit"
-        tell("D011", f"a macro cannot be called `{name.text}`: that is the unit {word}", name.place, help=help)
-        return None
+        raise Problem(
+            error(
+                "D011",
+                f"a macro cannot be called `{name.text}`: that is the unit {units.UNITS[name.text].word}",
+                name.place,
+                help=f"it would replace the unit in every quantity after it: `2 {name.text}` would lose its unit",
+            )
+        )
     body = tokens[1:]
     parameters: list[Token] | None = None
     if body and body[0].text == "(":
         close = next((i for i, token in enumerate(body) if token.text == ")"), None)
         if close is None:
-            tell(
-                "D007",
-                f"the parameters of macro `{name.text}` have no `)`",
-                body[0].place,
-                help=f"write `#define {name.text[:LONGEST_NAME]}(A, B) ...` on one line",
+            raise Problem(
+                error(
+                    "D007",
+                    f"the parameters of macro `{name.text}` have no `)`",
+                    body[0].place,
+                    help=f"write `#define {name.text[:LONGEST_NAME]}(A, B) ...` on one line",
+                )
             )
-            return None
         parameters = [token for token in body[1:close] if token.kind != SPACE]
-        if not _checked_parameters(name, parameters, findings):
-            return None
+        _check_parameters(parameters)
         body = body[close + 1 :]
     elif body and body[0].kind != SPACE:
-        tell(
-            "D007",
-            f"a space is needed between the macro's name and `{body[0].text[:LONGEST_NAME]}`",
-            body[0].place,
-            help=f"write `#define {name.text[:LONGEST_NAME]} {body[0].text[:LONGEST_NAME]}`",
+        raise Problem(
+            error(
+                "D007",
+                f"a space is needed between the macro's name and `{body[0].text[:LONGEST_NAME]}`",
+                body[0].place,
+                help=f"write `#define {name.text[:LONGEST_NAME]} {body[0].text[:LONGEST_NAME]}`",
+            )
         )
-        return None
     if len(body) > MOST_MACRO_BODY:
-        tell("D018", f"the body of macro `{name.text}` has more than {MOST_MACRO_BODY} tokens", name.place)
-        return None
+        raise Problem(
+            error("D018", f"the body of macro `{name.text}` has more than {MOST_MACRO_BODY} tokens", name.place)
+        )
     written = [token for token in body if token.kind != SPACE]
     for token in written:
         if token.kind == BAD:
             complain_of_stray(token, findings)
-    if not _checked_rest(written, parameters or (), findings):
-        return None
-    if parameters is not None and not (
-        _checked_strings(written, {token.text for token in parameters}, findings)
-        and _checked_units(parameters, written, is_macro, findings)
-    ):
-        return None
-    for token in (*written[:1], *written[-1:]):
-        if token.kind == PASTE:
-            tell(
-                "D019",
-                "`##` joins two tokens, so it cannot stand at an end",
-                token.place,
-                help="write what it joins on both sides of it",
-            )
-            return None
+    _check_rest(written, parameters or ())
+    if parameters is not None:
+        _check_strings(written, {token.text for token in parameters})
+        _check_units(parameters, written, is_macro)
+    _check_ends((*written[:1], *written[-1:]))
     return body
 
 
-def _checked_parameters(name: Token, written: list[Token], findings: Findings) -> bool:
-    """True for parameters of a macro that are names, each once; other ones are reported."""
+def _check_parameters(written: list[Token]) -> None:
+    """Raise Problem D007 where parameters of a macro are not names, each once, with commas between them."""
     seen: set[str] = set()
     for i, token in enumerate(written):
         last = i == len(written) - 1
@@ -94,84 +95,88 @@ def _checked_parameters(name: Token, written: list[Token], findings: Findings) -
             if token.text != "," or last:
                 more = token.text == "..."
                 help = f"write `...` alone, and `{REST}` in the body" if more else "write `(A, B)`: names, and commas"
-                findings.error(
-                    "D007", f"expected `,` and a parameter, or `)`, not `{token.text}`", token.place, help=help
+                raise Problem(
+                    error("D007", f"expected `,` and a parameter, or `)`, not `{token.text}`", token.place, help=help)
                 )
-                return False
         elif token.text == "..." and last:
             pass
         elif token.kind != NAME or token.text in PREDEFINED or token.text in seen:
             why, help = "cannot be a parameter", "a parameter is a name"
             if token.text in seen:
                 why, help = "is there twice", "give each parameter a name of its own"
-            findings.error("D007", f"`{token.text}` {why}", token.place, help=help)
-            return False
+            raise Problem(error("D007", f"`{token.text}` {why}", token.place, help=help))
         seen.add(token.text)
-    return True
 
 
-def _checked_strings(written: list[Token], parameters: set[str], findings: Findings) -> bool:
-    """Return True if a parameter follows each `#` of a macro that takes arguments; reports the others."""
+def _check_strings(written: list[Token], parameters: set[str]) -> None:
+    """Raise Problem D019 where no parameter follows a `#` in the body of a macro that takes arguments."""
     known = parameters - {"...", ","} | ({REST, OPTIONAL} if "..." in parameters else set())
     for i, token in enumerate(written):
         if token.text == "#" and (i + 1 == len(written) or written[i + 1].text not in known):
-            findings.error(
-                "D019",
-                "`#` makes a string of a parameter, and none follows",
-                token.place,
-                help="a macro cannot make directives",
+            raise Problem(
+                error(
+                    "D019",
+                    "`#` makes a string of a parameter, and none follows",
+                    token.place,
+                    help="a macro cannot make directives",
+                )
             )
-            return False
-    return True
 
 
-def _checked_rest(written: list[Token], parameters: Sequence[Token], findings: Findings) -> bool:
-    """Return True if `__VA_ARGS__` and whole `__VA_OPT__(...)` stand only where a macro takes more arguments."""
-    tell = findings.error
+def _check_rest(written: list[Token], parameters: Sequence[Token]) -> None:
+    """Raise Problem where `__VA_ARGS__` or `__VA_OPT__(...)` stands in the body of a macro that takes no more
+    arguments, or `__VA_OPT__` is not whole (D007), or begins or ends with `##` (D019)."""
     variadic = any(token.text == "..." for token in parameters)
     end = 0
     for i, token in enumerate(written):
         if token.kind != NAME or token.text not in (REST, OPTIONAL):
             continue
         if not variadic:
-            tell(
-                "D007",
-                f"`{token.text}` stands in the body of a macro that takes `...` only",
-                token.place,
-                help="`...` as the last parameter takes all further arguments",
+            raise Problem(
+                error(
+                    "D007",
+                    f"`{token.text}` stands in the body of a macro that takes `...` only",
+                    token.place,
+                    help="`...` as the last parameter takes all further arguments",
+                )
             )
-            return False
         if token.text == REST:
             continue
         if i < end:
-            tell("D007", f"`{OPTIONAL}` stands within another", token.place, help="write one behind the other")
-            return False
+            raise Problem(
+                error("D007", f"`{OPTIONAL}` stands within another", token.place, help="write one behind the other")
+            )
         opens = i + 1 < len(written) and written[i + 1].text == "("
         end = closing(written, i + 1) if opens else len(written)
         if end == len(written):
-            tell(
-                "D007",
-                f"`{OPTIONAL}` needs parentheses around what it is about",
-                token.place,
-                help=f"write `{OPTIONAL}(, {REST})`: what stands there is left out where no more arguments are given",
+            raise Problem(
+                error(
+                    "D007",
+                    f"`{OPTIONAL}` needs parentheses around what it is about",
+                    token.place,
+                    help=f"write `{OPTIONAL}(, {REST})`: what stands there is left out where no more arguments are "
+                    "given",
+                )
             )
-            return False
-        for piece in (written[i + 2], written[end - 1]):
-            if piece.kind == PASTE:
-                tell(
+        _check_ends((written[i + 2], written[end - 1]))
+
+
+def _check_ends(ends: Sequence[Token]) -> None:
+    """Raise Problem D019 where a `##` is among the first and last tokens of a body or of an `__VA_OPT__(...)`."""
+    for token in ends:
+        if token.kind == PASTE:
+            raise Problem(
+                error(
                     "D019",
                     "`##` joins two tokens, so it cannot stand at an end",
-                    piece.place,
+                    token.place,
                     help="write what it joins on both sides of it",
                 )
-                return False
-    return True
+            )
 
 
-def _checked_units(
-    parameters: Sequence[Token], written: list[Token], is_macro: Callable[[str], bool], findings: Findings
-) -> bool:
-    """Return True if no parameter with a unit's name stands where the body may have that unit."""
+def _check_units(parameters: Sequence[Token], written: list[Token], is_macro: Callable[[str], bool]) -> None:
+    """Raise Problem D011 where a parameter with a unit's name stands where the body may have that unit."""
     names = {token.text: token for token in parameters}
     for i, token in enumerate(written):
         if token.text not in names or not units.is_unit(token.text):
@@ -181,9 +186,8 @@ def _checked_units(
             word = units.UNITS[token.text].word
             message = f"a macro's parameter cannot be called `{token.text}`: in its body that is the unit {word}"
             label = Label(token.place, f"this `{token.text}` would be the argument, not the unit")
-            findings.error("D011", message, names[token.text].place, also=(label,), help="choose another name for it")
-            return False
-    return True
+            place, help = names[token.text].place, "choose another name for it"
+            raise Problem(error("D011", message, place, also=(label,), help=help))
 
 
 def _may_be_unit(body: Sequence[Token], parameters: Container[str], is_macro: Callable[[str], bool]) -> bool:

@@ -62,8 +62,10 @@ class Macros(Pcpp):
         """Enter a `#define`; a macro that is refused, or defined again differently, is reported."""
         if isinstance(tokens, str):  # pcpp's own macros, and the clock: a deck must mean the same tomorrow
             return
-        body = definitions.checked_definition(tokens, self.macros.__contains__, self.findings)
         name = tokens[0]
+        body: list[Token] | None = None
+        with self.findings.gather():
+            body = definitions.checked_definition(tokens, self.macros.__contains__, self.findings)
         if body is None:
             takes = len(tokens) > 1 and tokens[1].text == "("
             if name.kind == NAME and name.text not in PREDEFINED and (takes or not units.is_unit(name.text)):
