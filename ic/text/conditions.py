@@ -16,7 +16,7 @@ from typing import NamedTuple, NoReturn
 
 from ic.text.lexer import BAD, CHARACTER, DECIMAL, NAME, SPACE, STRING, WHOLE, Token, complain_of_stray
 from ic.text.limits import CONDITION_NESTING, LONGEST_NUMBER, MOST_TERMS, Findings
-from met.diagnostic import Place, write
+from met.diagnostic import Place, Problem, error, write
 
 _NUMBER = re.compile(r"(?:0[xX](?P<hex>[0-9a-fA-F]+)|0(?P<octal>[0-7]*)|(?P<decimal>[1-9][0-9]*))")
 _SUFFIX = re.compile(r"[uU](?:l|L|ll|LL)?|(?:l|L|ll|LL)[uU]?")
@@ -37,10 +37,6 @@ _COMPUTED: Mapping[str, Callable[[int, int], int]] = MappingProxyType(
 )
 
 
-class Refused(Exception):
-    """Raised where a condition has no meaning, which has been reported."""
-
-
 class _Value(NamedTuple):
     """A number of 64 bits; `plain` where it has no sign."""
 
@@ -48,31 +44,29 @@ class _Value(NamedTuple):
     plain: bool = False
 
 
-def well_formed(directive: Token, args: Sequence[Token], findings: Findings) -> bool:
-    """Return True if there is a condition, and each `defined` in it is followed by a name."""
+def check_written(directive: Token, args: Sequence[Token]) -> None:
+    """Raise Problem where a directive has no condition, a `defined` in it is without a name (D009), or it is too long
+    (D018)."""
     written = [token for token in args if token.kind != SPACE]
     if not written:
-        findings.error(
-            "D009",
-            f"`#{directive.text}` needs a condition",
-            directive.place,
-            help=f"write `#{directive.text} NAME == 1`, or another condition",
+        raise Problem(
+            error(
+                "D009",
+                f"`#{directive.text}` needs a condition",
+                directive.place,
+                help=f"write `#{directive.text} NAME == 1`, or another condition",
+            )
         )
-        return False
     if len(written) > MOST_TERMS:
-        findings.error("D018", f"a condition has at most {MOST_TERMS} tokens", directive.place)
-        return False
-    return _each_defined(written, findings) is not None
+        raise Problem(error("D018", f"a condition has at most {MOST_TERMS} tokens", directive.place))
+    _each_defined(written)
 
 
-def with_defined(tokens: Sequence[Token], is_defined: Callable[[Token], bool], findings: Findings) -> list[Token]:
-    """The condition with a number in place of each `defined NAME`; raises Refused where no name follows."""
+def with_defined(tokens: Sequence[Token], is_defined: Callable[[Token], bool]) -> list[Token]:
+    """The condition with a number in place of each `defined NAME`. Raises Problem D009 where no name follows."""
     written = [token for token in tokens if token.kind != SPACE]
-    stretches = _each_defined(written, findings)
-    if stretches is None:
-        raise Refused
     replaced, position = [], 0
-    for first, name, end in stretches:
+    for first, name, end in _each_defined(written):
         replaced += written[position:first]
         truth = written[first].__copy__()
         truth.kind, truth.text = WHOLE, "1" if is_defined(written[name]) else "0"
@@ -81,8 +75,8 @@ def with_defined(tokens: Sequence[Token], is_defined: Callable[[Token], bool], f
     return [*replaced, *written[position:]]
 
 
-def _each_defined(written: Sequence[Token], findings: Findings) -> list[tuple[int, int, int]] | None:
-    """Positions of each `defined`, its name, and the token after it; None, with an error, if one has no name."""
+def _each_defined(written: Sequence[Token]) -> list[tuple[int, int, int]]:
+    """Positions of each `defined`, its name, and the token after it. Raises Problem D009 if one has no name."""
     stretches: list[tuple[int, int, int]] = []
     texts = [token.text for token in written] + ["", "", ""]
     for i, token in enumerate(written):
@@ -92,14 +86,13 @@ def _each_defined(written: Sequence[Token], findings: Findings) -> list[tuple[in
         name = i + 1 + bracketed
         named = name < len(written) and written[name].kind == NAME
         if not named or (bracketed and texts[name + 1] != ")"):
-            findings.error("D009", "`defined` needs a macro's name", token.place, help="write `defined(NAME)`")
-            return None
+            raise Problem(error("D009", "`defined` needs a macro's name", token.place, help="write `defined(NAME)`"))
         stretches.append((i, name, name + 1 + bracketed))
     return stretches
 
 
 def evaluate(tokens: Sequence[Token], findings: Findings, unknown: Callable[[Token], None]) -> bool:
-    """Return True if an expanded condition holds; raises Refused, with the error noted, where it has no meaning.
+    """Return True if an expanded condition holds. Raises Problem where it has no meaning.
 
     unknown: called with each name that is not a macro and counts as 0
     """
@@ -117,7 +110,7 @@ class _Condition:
         self.depth = 0
 
     def truth(self) -> bool:
-        """True if the whole condition is not 0. Raises Refused."""
+        """True if the whole condition is not 0. Raises Problem."""
         value = self.whole(live=True)
         if self.position < len(self.tokens):
             self.cannot_follow()
@@ -126,8 +119,7 @@ class _Condition:
     # complaints
 
     def refuse(self, message: str, place: Token | Place, help: str = "", code: str = "D009") -> NoReturn:
-        self.findings.error(code, message, place.place if isinstance(place, Token) else place, help=help or ())
-        raise Refused
+        raise Problem(error(code, message, place.place if isinstance(place, Token) else place, help=help or ()))
 
     def not_understood(self, why: str, token: Token) -> NoReturn:
         used = next((token.text for token in self.tokens if token.text in _WORDS), "")
@@ -152,7 +144,7 @@ class _Condition:
         if token.kind == BAD:
             if token.text:  # else the mistake it stands for is already reported
                 complain_of_stray(token, self.findings)
-            raise Refused
+            raise Problem(())
 
     def no_double(self, token: Token) -> None:
         """Report `--` and `++`, which C reads as one token."""
@@ -170,7 +162,7 @@ class _Condition:
         return self.tokens[self.position].text if self.position < len(self.tokens) else ""
 
     def take(self, text: str, opening: Token) -> None:
-        """Take the sign that is to be next. opening: the one that it closes. Raises Refused where another is there."""
+        """Take the sign that is to be next. opening: the one that it closes. Raises Problem where another is there."""
         if self.text() != text:
             if self.position < len(self.tokens):
                 if self.text() not in (")", ":"):
@@ -226,7 +218,7 @@ class _Condition:
                 left = self.computed(token, left, self.binary(level + 1, live), live)
 
     def computed(self, operator: Token, left: _Value, right: _Value, live: bool) -> _Value:
-        """The value of an operator on two numbers of 64 bits, as in C. Raises Refused."""
+        """The value of an operator on two numbers of 64 bits, as in C. Raises Problem."""
         text, plain = operator.text, left.plain or right.plain
         if text in ("<<", ">>"):
             if not live:
@@ -275,7 +267,7 @@ class _Condition:
         return value
 
     def operand(self, token: Token, live: bool) -> _Value:
-        """The value of a number, a name or a character; of other tokens Refused is raised."""
+        """The value of a number, a name or a character; of other tokens Problem is raised."""
         self.no_stray(token)
         if token.kind == WHOLE:
             return self.number(token)
@@ -301,7 +293,7 @@ class _Condition:
         self.not_understood(f"expected a value, found `{token.text[:LONGEST_NUMBER]}`", token)
 
     def number(self, token: Token) -> _Value:
-        """The value of one of C's whole numbers, with its suffix. Raises Refused."""
+        """The value of one of C's whole numbers, with its suffix. Raises Problem."""
         self.position += 1
         text = token.text
         matched = _NUMBER.fullmatch(text)
@@ -330,7 +322,7 @@ class _Condition:
         return _Value(value, plain)
 
     def character(self, token: Token) -> _Value:
-        """The code of a character between quotes, with the sign of `char`. Raises Refused."""
+        """The code of a character between quotes, with the sign of `char`. Raises Problem."""
         self.position += 1
         inner = token.text[1:-1]
         escape = _ESCAPE.fullmatch(inner)

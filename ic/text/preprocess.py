@@ -15,7 +15,7 @@ from typing import Any
 from pcpp import Action, OutputDirective
 
 from ic.text.complaints import Complaints
-from ic.text.conditions import Refused, evaluate, well_formed, with_defined
+from ic.text.conditions import check_written, evaluate, with_defined
 from ic.text.edition import EDITIONS, LATEST
 from ic.text.files import LIBRARY, Files, FoundFile, folders_by_slash
 from ic.text.lexer import (
@@ -48,7 +48,7 @@ from ic.text.limits import (
 from ic.text.macros import Macros
 from ic.text.naming import VALUES, Named, names_in
 from ic.text.source import SourceFile
-from met.diagnostic import Diagnostic, Label, Place, Problem, did_you_mean, meant, nearest, write
+from met.diagnostic import Diagnostic, Label, Place, Problem, did_you_mean, error, meant, nearest, write
 from met.frozen import frozen
 
 CONDITIONALS = ("if", "ifdef", "ifndef", "elif", "elifdef", "elifndef", "else", "endif")
@@ -533,28 +533,25 @@ class _Preprocessor(Macros):
 
     def _condition(self, directive: Token, args: list[Token]) -> bool:
         """Return True if the condition of an `#if` or `#elif` holds; False, with an error, where it has no meaning."""
-        if not well_formed(directive, args, self.findings):
-            return False
-        self._conditions += 1
-        if self._conditions > MOST_CONDITIONS:
-            self._give_up("D018", f"more than {MOST_CONDITIONS} conditions", directive.place)
-        try:
-            before = with_defined(args, self._is_defined, self.findings)
+        with self.findings.gather():
+            check_written(directive, args)
+            self._conditions += 1
+            if self._conditions > MOST_CONDITIONS:
+                self._give_up("D018", f"more than {MOST_CONDITIONS} conditions", directive.place)
+            before = with_defined(args, self._is_defined)
             self.in_condition = True
-            expanded = with_defined(self.expand_macros(before), self._is_defined, self.findings)
-            if expanded:
-                zeros: list[Token] = []
-                truth = evaluate(expanded, self.findings, zeros.append)
-                for token in zeros:
-                    self._zeros.setdefault(token.text[:LONGEST_NAME], token.place)
-                return truth
-        except Refused:
-            return False
-        finally:
+            expanded = self.expand_macros(before)
             self.in_condition = False
-        help = "`#ifdef NAME` asks whether a macro is defined; a value is one of `#define NAME 1`"
-        message = f"the condition of this `#{directive.text}` expands to nothing"
-        self.findings.error("D009", message, args[0].place, help=help)
+            condition = with_defined(expanded, self._is_defined)
+            if not condition:
+                help = "`#ifdef NAME` asks whether a macro is defined; a value is one of `#define NAME 1`"
+                message = f"the condition of this `#{directive.text}` expands to nothing"
+                raise Problem(error("D009", message, args[0].place, help=help))
+            zeros: list[Token] = []
+            truth = evaluate(condition, self.findings, zeros.append)
+            for token in zeros:
+                self._zeros.setdefault(token.text[:LONGEST_NAME], token.place)
+            return truth
         return False
 
     def evalexpr(self, tokens: list[Token]) -> tuple[Any, Any]:
