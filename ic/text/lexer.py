@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import re
 from bisect import bisect_right
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from functools import cached_property
 from types import MappingProxyType
 from typing import Any
@@ -70,6 +70,9 @@ _TOKEN = re.compile(
     re.VERBOSE,
 )
 
+_KINDS = {"name": NAME, "string": STRING, "character": CHARACTER}
+"""The kinds of tokens that are kept as they are written, by the group of `_TOKEN` that finds them."""
+
 
 class Text:
     """A file's text under the name that messages print, and the lines that led to it, as a `Place` has them.
@@ -87,9 +90,8 @@ class Text:
 
     @cached_property
     def _starts(self) -> list[int]:
-        starts = [0]
-        starts.extend(match.end() for match in re.finditer("\n", self.text))
-        return starts
+        """The offset at which each line begins, [line]."""
+        return [0, *(match.end() for match in re.finditer("\n", self.text))]
 
     @cached_property
     def joined(self) -> str:
@@ -139,7 +141,7 @@ class Text:
 
     def place(self, offset: int, length: int, expansions: tuple[Expansion, ...] = ()) -> Place:
         """The place of `length` characters from `offset`, cut at the end of the line."""
-        line = bisect_right(self._starts, offset)
+        line = self.line(offset)
         start = self._starts[line - 1]
         end = self._starts[line] - 1 if line < len(self._starts) else len(self.text)
         return Place(
@@ -147,12 +149,9 @@ class Text:
         )
 
     def indent(self, offset: int) -> int:
-        """The column, from 1, of the first thing on the line that holds `offset`."""
-        start = self._starts[bisect_right(self._starts, offset) - 1]
-        end = start
-        while end < len(self.text) and self.text[end] in " \t":
-            end += 1
-        return end - start + 1
+        """The column, from 1, of the first thing on the line that holds the token at `offset`."""
+        before = self.text[self._starts[self.line(offset) - 1] : offset]
+        return len(before) - len(before.lstrip(" \t")) + 1
 
     def rest_of_line(self, offset: int) -> str:
         """The text from `offset` to the end of its line and of those that a backslash joins to it."""
@@ -184,11 +183,10 @@ class Token:
 
     @property
     def line(self) -> int:
+        """The number of the line, from 1, in which it begins."""
         return self.source.line(self.offset)
 
-    @property
-    def lineno(self) -> int:
-        return self.source.line(self.offset)
+    lineno = line  # pcpp's name for it
 
     @property
     def place(self) -> Place:
@@ -239,10 +237,10 @@ def _lines_of(source: Text, text: str) -> Iterator[list[Token]]:
         group = match.lastgroup
         piece = match.group()
         offset = match.start()
-        if group == "space":
+        if group == "space" or group == "comment":
             add(Token(SPACE, " ", source, offset, len(piece)))
-        elif group == "name":
-            add(Token(NAME, piece, source, offset, len(piece)))
+        elif group in _KINDS:
+            add(Token(_KINDS[group], piece, source, offset, len(piece)))
         elif group == "symbol":
             add(Token(_SYMBOLS[piece], piece, source, offset, len(piece)))
         elif group == "newline":
@@ -251,13 +249,8 @@ def _lines_of(source: Text, text: str) -> Iterator[list[Token]]:
             line = []
             add = line.append
         elif group == "number":
-            add(Token(_number_kind(piece), piece, source, offset, len(piece)))
-        elif group == "comment":
-            add(Token(SPACE, " ", source, offset, len(piece)))
-        elif group == "string":
-            add(Token(STRING, piece, source, offset, len(piece)))
-        elif group == "character":
-            add(Token(CHARACTER, piece, source, offset, len(piece)))
+            kind = WHOLE if piece.isdigit() or piece[1:2] in ("x", "X") else DECIMAL
+            add(Token(kind, piece, source, offset, len(piece)))
         elif group == "unclosed":
             add(Token(BAD, piece, source, offset, 2))
             break
@@ -266,10 +259,6 @@ def _lines_of(source: Text, text: str) -> Iterator[list[Token]]:
     if line:
         add(Token(SPACE, "\n", source, len(text), 1))
         yield line
-
-
-def _number_kind(piece: str) -> str:
-    return WHOLE if piece.isdigit() or piece[1:2] in ("x", "X") else DECIMAL
 
 
 # characters from word processors and other notations, with the deck's text for them
@@ -313,27 +302,24 @@ def complain_of_unseen(source: Text, findings: Findings) -> None:
         )
 
 
+_STRAY: Mapping[str, tuple[str, str, Sequence[str] | str]] = MappingProxyType({
+    "/": ("D003", "this comment is not closed", "its `*/` is missing"),
+    '"': ("D003", "this string is not closed", 'a string ends with `"` on the line it began on'),
+    "'": ("D004", "a stray `'`", 'a string is written in double quotes: `"text"`'),
+    "#": ("D004", "a stray `{}`", ("a comment begins with `//`", "a directive is the first thing on its line")),
+    "\\": ("D004", "a stray `\\`", "it joins lines only as the last character of one"),
+})  # fmt: skip
+"""By the first character of what is no token: the code of the message, the message, and the help."""
+
+
 def complain_of_stray(token: Token, findings: Findings) -> None:
     """Report why a token of kind BAD, a character constant or a `#` cannot stand in a deck."""
-    text = token.text
-    tell = findings.error
-    if text == "/*":
-        tell("D003", "this comment is not closed", token.place, help="its `*/` is missing")
-    elif text.startswith('"'):
-        tell("D003", "this string is not closed", token.place, help='a string ends with `"` on the line it began on')
-    elif token.kind == CHARACTER:
-        tell("D004", "a string is written in double quotes", token.place, help=write(f'"{text[1:-1]}"'))
-    elif text.startswith("'"):
-        tell("D004", "a stray `'`", token.place, help='a string is written in double quotes: `"text"`')
-    elif text.startswith("#"):
-        tell(
-            "D004",
-            f"a stray `{text}`",
-            token.place,
-            help=["a comment begins with `//`", "a directive is the first thing on its line"],
-        )
-    elif text == "\\":
-        tell("D004", "a stray `\\`", token.place, help="it joins lines only as the last character of one")
+    text, place = token.text, token.place
+    if token.kind == CHARACTER:
+        findings.error("D004", "a string is written in double quotes", place, help=write(f'"{text[1:-1]}"'))
+    elif text[0] in _STRAY:
+        code, message, help = _STRAY[text[0]]
+        findings.error(code, message.format(text), place, help=help)
     else:
         import unicodedata
 
@@ -347,4 +333,4 @@ def complain_of_stray(token: Token, findings: Findings) -> None:
             name += f" ({known})"
         remedy = write(" ", "write a space", old=first) if plain == "a space" else write(plain or "", old=first)
         usual = write("", "leave it out", old=first) if text.isascii() else "names and units are written in plain ASCII"
-        tell("D004", f"{name} does not belong in a deck", token.place, help=remedy if plain else usual)
+        findings.error("D004", f"{name} does not belong in a deck", place, help=remedy if plain else usual)
