@@ -6,7 +6,6 @@ a .. b by c  <  or  <  and  <  not  <  comparison  <  + -  <  * /  <  unary -  <
 from __future__ import annotations
 
 import re
-from copy import copy
 
 from ic.grammar.braced_names import USAGE, adjacent, braces_length, name_length
 from ic.grammar.cursor import SHOWN, span, token_in_words
@@ -167,10 +166,8 @@ class Expressions(Quantities):
 
     def stand_in(self, index: Token) -> Token:
         """The token for which the index of a loop stands in this iteration, at the index's place."""
-        token = copy(index)
-        token.text = self.indices[index.text]
-        token.kind = WHOLE if token.text.lstrip("-").isdigit() else NAME
-        return token
+        text = self.indices[index.text]
+        return index.standing_for(WHOLE if text.lstrip("-").isdigit() else NAME, text)
 
     def with_unit(self, inner: Expression, opening: Token) -> Expression:
         """The expression whose bracket was just closed, with the unit that may follow it."""

@@ -68,9 +68,7 @@ def with_defined(tokens: Sequence[Token], is_defined: Callable[[Token], bool]) -
     replaced, position = [], 0
     for first, name, end in _each_defined(written):
         replaced += written[position:first]
-        truth = written[first].__copy__()
-        truth.kind, truth.text = WHOLE, "1" if is_defined(written[name]) else "0"
-        replaced.append(truth)
+        replaced.append(written[first].standing_for(WHOLE, "1" if is_defined(written[name]) else "0"))
         position = end
     return [*replaced, *written[position:]]
 

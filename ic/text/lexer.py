@@ -203,6 +203,12 @@ class Token:
         other.painted = self.painted
         return other
 
+    def standing_for(self, kind: str, text: str) -> Token:
+        """A token of another kind and text at the same place, which came through the same macros."""
+        token = self.__copy__()
+        token.kind, token.text = kind, text
+        return token
+
     def __repr__(self) -> str:
         return f"Token({self.kind!r}, {self.text!r}, {self.place})"
 

@@ -181,22 +181,20 @@ class Macros(Pcpp):
     def _predefined(self, token: Token) -> Token:
         """The replacement of a predefined macro, such as `__LINE__`, at this use; those of the clock are refused."""
         outermost = token.expansions[-1].use if token.expansions else token.place
-        replacement = token.__copy__()
         if token.text == "__LINE__":
-            replacement.kind, replacement.text = WHOLE, str(outermost.line)
-        elif token.text == COUNTER and self.in_condition:
+            return token.standing_for(WHOLE, str(outermost.line))
+        if token.text == "__FILE__":
+            return token.standing_for(STRING, f'"{outermost.file}"')
+        if token.text == COUNTER and not self.in_condition:
+            self._counted += 1
+            return token.standing_for(WHOLE, str(self._counted - 1))
+        if token.text == COUNTER:
             self.findings.error(
                 "D009",
                 f"`{COUNTER}` has no value in a condition",
                 token.place,
                 help="it counts its uses in the text; `#define` a macro to choose by",
             )
-            replacement.kind, replacement.text = BAD, ""
-        elif token.text == COUNTER:
-            replacement.kind, replacement.text = WHOLE, str(self._counted)
-            self._counted += 1
-        elif token.text == "__FILE__":
-            replacement.kind, replacement.text = STRING, f'"{outermost.file}"'
         elif token.text in CLOCK:
             self.findings.error(
                 "D016",
@@ -204,8 +202,9 @@ class Macros(Pcpp):
                 token.place,
                 help="leave it out: beside an archive, `.run.json` says when it was made",
             )
-            replacement.kind, replacement.text = BAD, ""
-        return replacement
+        else:
+            return token
+        return token.standing_for(BAD, "")
 
     def _use_refused(self, token: Token, pending: list[Token]) -> Token:
         """Skip the use of a refused macro, including arguments; its expansion causes no further messages."""
@@ -218,9 +217,7 @@ class Macros(Pcpp):
                 depth += {"(": 1, ")": -1}.get(piece.text, 0)
                 if piece.kind == LEFT:
                     self._inside.discard(piece.text)
-        bad = token.__copy__()
-        bad.kind, bad.text = BAD, ""
-        return bad
+        return token.standing_for(BAD, "")
 
     def _use(self, token: Token, macro: Macro, pending: list[Token]) -> bool:
         """Put a macro's replacement in front of the pending tokens; False where the name is not a use of it."""
@@ -234,9 +231,7 @@ class Macros(Pcpp):
                 return False
             collected = self._collect(token, macro, pending)
             if collected is None:
-                bad = token.__copy__()
-                bad.kind, bad.text = BAD, ""
-                pending.append(bad)
+                pending.append(token.standing_for(BAD, ""))
                 return True
             arguments = collected
         replacement = self._substitute(token, macro, arguments)
@@ -276,8 +271,7 @@ class Macros(Pcpp):
                 arguments.append(Argument())
                 continue
             if piece.kind == PASTE:  # as an argument it joins nothing
-                piece = piece.__copy__()
-                piece.kind = HASHES
+                piece = piece.standing_for(HASHES, text)
             arguments[-1].append(piece)
         else:
             self._give_up(
