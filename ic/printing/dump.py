@@ -7,17 +7,25 @@ batch/terminal/dump.py.
 
 from __future__ import annotations
 
+import json
+import sys
 from collections.abc import Callable, Iterator, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+import ic
+from ic.grammar.spell import spell
+from ic.grammar.syntax import Call, Entry, Group, Let, Setting, Statement
+from ic.language import DEFINITIONS
+from ic.meaning.definitions.merge import Item, MergedBlock
+from ic.meaning.definitions.resolve import Definitions
+from ic.read import read
+from ic.text.complaints import Complaints
+from ic.text.preprocess import preprocess
 from met.diagnostic import Place, Problem, did_you_mean, error
 from met.frozen import frozen
 from met.host.entry_points import offered
-
-if TYPE_CHECKING:
-    from ic.grammar.syntax import Entry
-    from ic.meaning.definitions.merge import Item, MergedBlock
-    from met.plan import Plan
+from met.plan import Plan
+from met.plan import file as plan_file
 
 GROUP = "met.stages"
 ORDER = ("tokens", "syntax", "model", "plan", "program", "kernel")  # others come after
@@ -36,11 +44,7 @@ class DumpRequest:
 
     def plan(self) -> Plan:
         """The plan, compiled, or read from a plan file. Raises Problem."""
-        import ic
-
         if self.deck.endswith(".json"):
-            from met.plan import file as plan_file
-
             return plan_file.read(self.deck)
         return ic.compile(
             self.deck, include_dirs=self.include_dirs, defines=self.defines, set=self.settings, select=self.select
@@ -69,12 +73,10 @@ def find_stage(name: str) -> Stage:
 
 def tokens(request: DumpRequest) -> Iterator[str]:
     """Tokens after the preprocessor: place, kind, text, and the macros that a token came through."""
-    from ic.text.preprocess import preprocess
-
-    read = preprocess(request.deck, request.include_dirs, request.defines)
-    if not read.complete or any(diagnostic.severity == "error" for diagnostic in read.diagnostics):
-        raise Problem(read.diagnostics, {source.name: source.text for source in read.sources})
-    for token in read.tokens:
+    deck = preprocess(request.deck, request.include_dirs, request.defines)
+    if not deck.complete or any(diagnostic.severity == "error" for diagnostic in deck.diagnostics):
+        raise Problem(deck.diagnostics, {source.name: source.text for source in deck.sources})
+    for token in deck.tokens:
         place = token.place
         through = "".join(f"  from {step.macro} at {step.use}" for step in place.expansions)
         yield f"{place!s:32} {token.kind:14} {token.text}{through}"
@@ -82,20 +84,12 @@ def tokens(request: DumpRequest) -> Iterator[str]:
 
 def syntax(request: DumpRequest) -> Iterator[str]:
     """The syntax tree, entry by entry."""
-    from ic.read import read
-
     for entry in read(request.deck, request.include_dirs, request.defines).entries:
         yield from _entry(entry, "")
 
 
 def model(request: DumpRequest) -> Iterator[str]:
     """Definitions with `like`, overrides, `+=` and `remove` carried out, each entry with the places it overrode."""
-    from ic.grammar.spell import spell
-    from ic.language import DEFINITIONS
-    from ic.meaning.definitions.resolve import Definitions
-    from ic.read import read
-    from ic.text.complaints import Complaints
-
     deck = read(request.deck, request.include_dirs, request.defines)
     complaints = Complaints(deck.warnings)
     definitions = Definitions(deck, complaints)
@@ -121,34 +115,26 @@ def model(request: DumpRequest) -> Iterator[str]:
 
 def plan(request: DumpRequest) -> Iterator[str]:
     """The run plan, as `met plan -o` writes it, its case tables inside; with a line for each value on a terminal."""
-    import json
-    import sys
-
-    from met.plan import file as plan_file
-
     text = plan_file.dumps(request.plan()).rstrip("\n")
     yield json.dumps(json.loads(text), indent=1) if sys.stdout.isatty() else text
 
 
 def _entry(entry: Entry, indent: str) -> Iterator[str]:
     """The lines that `met dump syntax` prints of an entry and of all that it contains."""
-    from ic.grammar import syntax as tree
-    from ic.grammar.spell import spell
-
     match entry:
-        case tree.Let():
+        case Let():
             kind = "Param" if entry.is_param else "Let"
             yield f"{indent}{kind} {entry.name.text} = {spell(entry.value)}{_written(entry.place)}"
-        case tree.Setting():
+        case Setting():
             words = "".join(f"{word.text} " for word in entry.words)
             path = ".".join(word.text for word in entry.path)
             head, body = _value(entry.value)
             yield f"{indent}Setting {words}{path} {entry.operator} {head}{_written(entry.place)}"
             yield from _entries(body, indent)
-        case tree.Statement():
+        case Statement():
             words = " ".join(word.text for word in entry.words)
             yield f"{indent}Statement {words} {spell(entry.value)}{_written(entry.place)}"
-        case tree.Group():
+        case Group():
             words = " ".join(word.text for word in entry.words)
             like = f" like {entry.like.text}" if entry.like is not None else ""
             of_base = f" of {entry.of.text}" if entry.of is not None else ""
@@ -167,9 +153,6 @@ def _value(value: Any, named_apart: bool = False) -> tuple[str, Sequence[Entry]]
 
     named_apart: what a call names is shown elsewhere.
     """
-    from ic.grammar.spell import spell
-    from ic.grammar.syntax import Call
-
     if isinstance(value, Call) and (value.body is not None or named_apart):
         bare = not value.positional and (named_apart or not value.named)
         return (value.name.text if bare else spell(value)), value.body or ()
@@ -178,8 +161,6 @@ def _value(value: Any, named_apart: bool = False) -> tuple[str, Sequence[Entry]]
 
 def _block(block: MergedBlock, indent: str) -> Iterator[str]:
     """The lines that `met dump model` prints of a merged block."""
-    from ic.grammar.spell import spell
-
     for item in block.items.values():
         yield from _item(item, indent)
     for statement in block.statements:
