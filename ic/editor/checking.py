@@ -12,16 +12,15 @@ import time
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import field
 from pathlib import Path
-from typing import TYPE_CHECKING
 
-from met.diagnostic import Diagnostic
+from ic.driver.by_definition import DefinitionChecks, Known
+from ic.driver.compile import Compiled, check
+from ic.editor.index import DeckIndex, index_of
+from ic.read import read
+from met.analysis.memo import AnalysisMemo
+from met.diagnostic import Diagnostic, Problem
 from met.frozen import frozen
-from met.messages.edits import Edit
-
-if TYPE_CHECKING:
-    from ic.driver.by_definition import Known
-    from ic.driver.compile import Compiled
-    from ic.editor.index import DeckIndex
+from met.messages.edits import Edit, edits
 
 LENGTH = struct.Struct("!Q")
 """The length of a pickled answer, which precedes it."""
@@ -109,17 +108,11 @@ def answers(
     compiled, reply = compiled_with_reply(request, keep)
     yield reply
     if compiled.plan is not None:
-        from ic.editor.index import index_of
-
         yield index_of(compiled)
 
 
 def first_replies(request: CheckRequest, clock: Callable[[], float] = time.monotonic) -> Iterator[CheckReply]:
     """Replies before the audit; for a deck that cannot be read, all of them. clock: in s"""
-    from ic.driver.by_definition import DefinitionChecks
-    from ic.read import read
-    from met.diagnostic import Problem
-
     began = clock()
     try:
         deck = read(
@@ -146,9 +139,6 @@ def compiled_with_reply(
     request: CheckRequest, keep: Callable[[FoundAnswers], object] = lambda _: None
 ) -> tuple[Compiled, CheckReply]:
     """A compiled deck, with the reply to the request, made in this process. keep: as for `answers`"""
-    from ic.driver.compile import check
-    from met.analysis.memo import AnalysisMemo
-
     kept_at = time.monotonic()
 
     def keep_so_far() -> None:
@@ -177,8 +167,6 @@ def _reply(
     diagnostics: tuple[Diagnostic, ...], sources: Mapping[str, str], *, known: Known | None = None, audited: bool = True
 ) -> CheckReply:
     """The answer of a check to the server, with the edits that carry out each diagnostic's help."""
-    from met.messages.edits import edits
-
     return CheckReply(
         diagnostics,
         tuple(tuple(edits(diagnostic, sources)) for diagnostic in diagnostics),

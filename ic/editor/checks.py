@@ -18,8 +18,9 @@ import time
 import traceback
 from collections.abc import Callable, Iterable
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import Any
 
+from ic.driver.by_definition import Known
 from ic.editor.checker_process import CheckerProcess
 from ic.editor.checking import CheckReply, CheckRequest, Crash, FoundAnswers
 from ic.editor.index import DeckIndex
@@ -28,9 +29,6 @@ from ic.editor.structure import KnownStructures, used_files
 from met.diagnostic import Diagnostic, Label, Place
 from met.frozen import frozen
 from met.host.files import real_path
-
-if TYPE_CHECKING:
-    from ic.driver.by_definition import Known
 
 NO_DECKS = (".csv", ".urdf")
 """The endings of files that decks name and that are not decks."""
@@ -129,13 +127,17 @@ class DeckChecks:
 
     def shut(self, uri: str) -> None:
         """Handle the closing of a text: its file counts again."""
-        self.texts.pop(uri, None)
-        self.checked.pop(uri, None)
-        self.indexes.pop(uri, None)
-        self._known.pop(uri, None)
-        self._answers.pop(uri, None)
-        self._audits.pop(uri, None)
-        self._stale.pop(uri, None)
+        by_address: tuple[dict[str, Any], ...] = (
+            self.texts,
+            self.checked,
+            self.indexes,
+            self._known,
+            self._answers,
+            self._audits,
+            self._stale,
+        )
+        for kept in by_address:
+            kept.pop(uri, None)
         self._failed.discard(uri)
         self.structures.forget(uri)
         self.all_changed()
