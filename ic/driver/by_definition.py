@@ -15,9 +15,9 @@ import pickle
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from functools import partial
 
+from ic.driver.compile import TOO_DEEP, check_names
 from ic.grammar.syntax import Deck, Entry, Group
 from ic.language import EXPERIMENTS
-from ic.meaning.checks.slips import remark_degrees
 from ic.meaning.control.servos import check_servo_definition
 from ic.meaning.definitions.resolve import Definition, Definitions
 from ic.meaning.mechanics.arm import bring_arm, check_arm, packed_arm, resolve_arm
@@ -87,9 +87,7 @@ class DefinitionChecks:
             with complaints.gather():
                 allowances = self._units[n][1](self._definitions.reporting_to(complaints), complaints)
         except RecursionError:
-            complaints.error(
-                "D078", "this deck's values are nested too deeply", help="build them up in steps, with `let`"
-            )
+            complaints.add(TOO_DEEP)
         definition = self._units[n][0]
         arm = packed_arm(self._definitions, definition.name) if definition.kind == "arm" else b""
         self._findings[n] = KnownFindings(complaints.findings(), allowances, arm)
@@ -123,16 +121,9 @@ class DefinitionChecks:
         try:
             with complaints.gather():
                 check_params(definitions, complaints)
-                lets = Scope(definitions, complaints).names.check_lets()
-                complaints.add(*(diagnostic for problem in lets for diagnostic in problem.diagnostics))
-                remark_degrees(self._deck, definitions, complaints)
-                for kind in ("arm", "servo", "run"):
-                    for definition in definitions.of_kind(kind).values():
-                        definitions.block(definition)
+                check_names(self._deck, definitions, complaints)
         except RecursionError:
-            complaints.error(
-                "D078", "this deck's values are nested too deeply", help="build them up in steps, with `let`"
-            )
+            complaints.add(TOO_DEEP)
 
     def _all(self) -> Iterator[tuple[Definition, Check]]:
         """Every definition with its check, in the order of `met check`."""

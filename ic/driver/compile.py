@@ -134,13 +134,7 @@ def compile_deck(
     try:
         check_params(written, complaints)
         overrides.check_lets(written, complaints)
-        complaints.add(
-            *(d for problem in Scope(definitions, complaints).names.check_lets() for d in problem.diagnostics)
-        )
-        remark_degrees(deck, definitions, complaints)
-        for kind in ("arm", "servo", "run"):
-            for definition in definitions.of_kind(kind).values():
-                definitions.block(definition)
+        check_names(deck, definitions, complaints)
         requested = asked_definitions(definitions, complaints, select)
         for definition in requested:
             groups: list[ScopedExperiment] = []
@@ -194,6 +188,16 @@ def compile_deck(
         allowed_warnings(experiments, complaints),
         deck.units,
     )
+
+
+def check_names(deck: Deck, definitions: Definitions, complaints: Complaints) -> None:
+    """Check what belongs to no single definition: the deck's `let`s, its angles, and the merging of definitions."""
+    for problem in Scope(definitions, complaints).names.check_lets():
+        complaints.add(*problem.diagnostics)
+    remark_degrees(deck, definitions, complaints)
+    for kind in ("arm", "servo", "run"):
+        for definition in definitions.of_kind(kind).values():
+            definitions.block(definition)
 
 
 def _remark_unused_rows(definitions: Definitions, scopes: Iterable[Scope], complaints: Complaints) -> None:
