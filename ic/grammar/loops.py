@@ -12,7 +12,7 @@ from collections.abc import Mapping, Sequence
 from typing import NoReturn
 
 from ic.grammar.braced_names import USAGE, NoName, NotWhole, filled, name_length, whole
-from ic.grammar.cursor import span, token_in_words
+from ic.grammar.cursor import OPENING, span, token_in_words
 from ic.grammar.expressions import EVERY_JOINT, Expressions
 from ic.grammar.syntax import Entry, Expression, Group, Setting, Word
 from ic.text.lexer import BAD, END, NAME, Token
@@ -125,10 +125,10 @@ class Loops(Expressions):
             self.tell("D283", message, index, help="give one of the two another name")
 
     def closing(self, position: int) -> int:
-        """The position of the brace that closes the one at `position`, or that of the end."""
-        depth = 0
+        """The position of the token that closes the brace or parenthesis at `position`, or that of the end."""
+        opening, depth = self.tokens[position].text, 0
         while self.tokens[position].kind != END:
-            depth += {"{": 1, "}": -1}.get(self.tokens[position].text, 0)
+            depth += {opening: 1, OPENING[opening]: -1}.get(self.tokens[position].text, 0)
             if depth == 0:
                 break
             position += 1

@@ -136,9 +136,8 @@ class _Parser(Uses):
             if token.text == UNIT and is_declaration(self.tokens, self.position):
                 self.step_over_unit()
                 continue
-            start = self.position
+            start, operators = self.position, self.operators
             try:
-                operators = self.operators
                 if self.at_loop():
                     self.loop(into)
                 elif self.at_use():
@@ -147,11 +146,10 @@ class _Parser(Uses):
                     into += self.several()
                 else:
                     into.append(self.entry())
-                self.operators = operators
             except Unreadable:
-                self.operators = operators
                 self.recover(start, depth)
                 into += self.note_unreadable(start)
+            self.operators = operators
 
     def note_unreadable(self, start: int) -> list[Entry]:
         """Note that an entry could not be read, with the known part: the name that it sets, to an unknown value."""
@@ -242,7 +240,8 @@ class _Parser(Uses):
             self.replaced_name()
         while self.token.kind == NAME and not (len(names) > 0 and self.line_break_in(names)):
             names.append(self.advance())
-        if _arm_from(names) and self.token.text in (".", "..", "/", "-"):
+        arm_from = len(names) >= 3 and (first.text, names[2].text) == ("arm", "from")
+        if arm_from and self.token.text in (".", "..", "/", "-"):
             self.file_without_quotes(names)
         tail: list[Token] = []
         if self.token.text == ".":
@@ -278,7 +277,7 @@ class _Parser(Uses):
             self.unexpected("`=`", help="a deck writes `name = value;`")
         if text == "==" and len(names) == 1 and not tail:
             self.fail("D023", "`==` compares", self.token, help=write("=", "to set a value, write `=`"))
-        if _base_at(names) is not None and not self.begins_value_on_this_line():
+        if _base_at(names) is not None and (not self.begins_value() or self.on_new_line(self.position)):
             self.no_brace([*names, *tail])
         return self.statement(start, names, tail)
 
@@ -316,9 +315,6 @@ class _Parser(Uses):
                 "D020", "`*=` is one sign", token, help=write("* =", "the servo of all other joints is `* = SERVO;`")
             )
         self.unexpected("an entry, such as `name = value;`")
-
-    def begins_value_on_this_line(self) -> bool:
-        return self.begins_value() and not self.on_new_line(self.position)
 
     def no_brace(self, names: list[Token]) -> None:
         """Report `servo light like strong` without its `{`, and skip what follows of its block. Raises Unreadable."""
@@ -429,11 +425,7 @@ class _Parser(Uses):
             self.fail(
                 "D032", f"`{words[-2].text}` and `from` both name a base", names[-2], help="there is one base only"
             )
-        closing, depth = self.position + 1, 1
-        while depth and self.tokens[closing].kind != END:
-            depth += {"(": 1, ")": -1}.get(self.tokens[closing].text, 0)
-            closing += 1
-        behind = self.tokens[closing]
+        behind = self.tokens[self.closing(self.position) + 1]
         if behind.text in ("like", "of"):
             self.fail("D032", f"`from` and `{behind.text}` both name a base", behind, help="there is one base only")
         call = self.call(Name((_word(called),), called.place), called)
@@ -480,18 +472,18 @@ class _Parser(Uses):
         if self.token.text == "in":
             self.advance()
             share = self.expression()
-            self.needs_word("of", _OVER_CASES)
-            self.needs_word("cases", _OVER_CASES)
+            self.take_word_of_requirement("of")
+            self.take_word_of_requirement("cases")
         if self.token.text == "with":
             self.advance()
             confidence = self.expression()
-            self.needs_word("confidence", _OVER_CASES)
+            self.take_word_of_requirement("confidence")
         return OverCases(comparison, share, confidence, span(first, self.previous))
 
-    def needs_word(self, word: str, usage: str) -> None:
-        """Step over a required word."""
+    def take_word_of_requirement(self, word: str) -> None:
+        """Step over a word that a requirement over cases needs here. Raises Unreadable where another stands here."""
         if self.token.text != word:
-            self.unexpected(f"`{word}`", help=usage)
+            self.unexpected(f"`{word}`", help=_OVER_CASES)
         self.advance()
 
     def no_statement(self, names: list[Token], token: Token) -> None:
@@ -515,7 +507,8 @@ class _Parser(Uses):
             raise Unreadable
         if may_open and isinstance(value, Name):
             self.unopened.append(self.behind(self.previous))
-        if token.text == "}" or token.kind == END or self.on_new_line(self.position):
+        begins_next = token.kind == NAME and self.following.text in ("=", "+=", "{", ".")
+        if token.text == "}" or token.kind == END or self.on_new_line(self.position) or begins_next:
             self.tell("D021", "expected `;`", self.behind(self.previous), help=write(";", _SEMICOLON, where="before"))
             return
         another = self.following.kind == NAME and self.tokens[self.position + 2].text in ("=", "+=")
@@ -526,9 +519,6 @@ class _Parser(Uses):
         if token.text in (")", "]"):
             self.unbalanced = True
             self.fail("D022", f"this `{token.text}` closes nothing", token, help=_NOT_OPEN)
-        if token.kind == NAME and self.following.text in ("=", "+=", "{", "."):
-            self.tell("D021", "expected `;`", self.behind(self.previous), help=write(";", _SEMICOLON, where="before"))
-            return
         helps = {
             "=": "to compare, write `==`; to set two things, write two entries",
             "..": "a range is written `first .. last by step`",
@@ -567,11 +557,6 @@ def _base_at(names: Sequence[Token]) -> int | None:
 def _made_from(names: Sequence[Token], tail: Sequence[Token]) -> bool:
     """Return True if the names of a definition end in `from MODEL`, before the arguments of the model."""
     return len(names) >= 4 and names[-2].text == "from" and not tail
-
-
-def _arm_from(names: Sequence[Token]) -> bool:
-    """Return True if the names begin `arm NAME from`."""
-    return len(names) >= 3 and (names[0].text, names[2].text) == ("arm", "from")
 
 
 def _words_before_value(names: Sequence[Token], dotted: bool, following: Token) -> int:
