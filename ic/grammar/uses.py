@@ -10,7 +10,6 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import replace
-from functools import cached_property
 from itertools import pairwise
 from typing import NoReturn
 
@@ -39,14 +38,17 @@ from ic.text.limits import Findings
 from met.diagnostic import Label, leave_out
 from met.units import ONE
 
+USE, AS = "use", "as"
+USE_USAGE = 'write `use <panda.ic> as panda;` or `use "beside.ic" as beside;`'
 
-class EditionEntries(Loops):
-    """The part of the parser that knows these entries."""
 
-    @cached_property
-    def refused_units(self) -> set[str]:
-        """Files of edition 1 that declare units, which has been reported."""
-        return set()
+class Uses(Loops):
+    """The part of the parser for the edition of a file, the units that a deck declares, and the decks that it uses."""
+
+    def __init__(self, tokens: Sequence[Token], findings: Findings) -> None:
+        super().__init__(tokens, findings)
+        self.uses: list[UseEntry] = []
+        self.refused_units: set[str] = set()  # files of edition 1 that declare units, which has been reported
 
     def declare_units(self) -> None:
         """Find the units that the deck declares anywhere, before it is parsed."""
@@ -81,8 +83,8 @@ class EditionEntries(Loops):
 
     def step_over_unit(self) -> None:
         """Step over `unit NAME = SIZE;`, which has been read, and refuse it where it is not allowed."""
-        start, (word, name) = self.position, self.tokens[self.position : self.position + 2]
-        depth = len(self.open)
+        start, depth = self.position, len(self.open)
+        word, name = self.tokens[start : start + 2]
         try:
             if word.source.edition == 1:
                 help = self.as_edition_2(word, "a file of edition 2 declares units")
@@ -99,10 +101,9 @@ class EditionEntries(Loops):
             self.position += 3
             self.units_alone = True
             self.semicolon(self.value())
-            self.units_alone = False
         except Unreadable:
-            self.units_alone = False
             self.recover(start, depth)
+        self.units_alone = False
 
     def not_the_edition(self, word: Token) -> NoReturn:
         """Report a `deck 2;` that does not set the edition, at its number."""
@@ -119,18 +120,6 @@ class EditionEntries(Loops):
             self.fail("D391", "this is no edition", span(word, number), help=f"write {known} in the file's first line")
         message = "a file says its edition before all else but comments"
         self.fail("D391", message, span(word, number), help=f"make `{edition_entry}` the first line of the file")
-
-
-USE, AS = "use", "as"
-USE_USAGE = 'write `use <panda.ic> as panda;` or `use "beside.ic" as beside;`'
-
-
-class Uses(EditionEntries):
-    """The part of the parser for this entry."""
-
-    def __init__(self, tokens: Sequence[Token], findings: Findings) -> None:
-        super().__init__(tokens, findings)
-        self.uses: list[UseEntry] = []
 
     def at_use(self) -> bool:
         """Return True if a deck is used here, or text that was meant for that."""
