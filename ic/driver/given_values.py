@@ -24,7 +24,7 @@ from ic.meaning.expressions.conditions import Checks
 from ic.meaning.expressions.quantity import measure_of
 from ic.read import read
 from ic.text.complaints import Complaints, known_words
-from ic.text.lexer import END, SPACE, Text, Token, logical_lines
+from ic.text.lexer import END, Text, Token, solid_tokens
 from ic.text.source import SourceFile
 from met.diagnostic import Diagnostic, Problem, did_you_mean, error
 from met.frozen import frozen
@@ -326,8 +326,7 @@ def _given_paths(errors: Iterable[Diagnostic], values: Mapping[str, tuple[float 
 def _entries(text: str) -> tuple[Entry, ...]:
     """The entries of a text without preprocessor lines. Raises Problem."""
     source = Text(GIVEN, text)
-    tokens = [token for line in logical_lines(source) for token in line if token.kind != SPACE]
-    entries, diagnostics = parse([*tokens, Token(END, "", source, len(text.rstrip()), 1)])
+    entries, diagnostics = parse([*solid_tokens(source), Token(END, "", source, len(text.rstrip()), 1)])
     if diagnostics:
         raise Problem(diagnostics, {GIVEN: _without_vary(text)})
     return entries

@@ -21,7 +21,7 @@ from ic.driver.compile import Compiled, check
 from ic.read import read
 from ic.text.edition import EDITION_WORD, LATEST, edition_of
 from ic.text.files import NOTHING_UNSAVED, Files, FoundFile, Unsaved
-from ic.text.lexer import NAME, NUMBERS, SPACE, Text, logical_lines
+from ic.text.lexer import NAME, NUMBERS, Text, solid_tokens
 from met import units
 from met.diagnostic import Diagnostic, Label, Place, Problem, error
 from met.frozen import frozen
@@ -141,13 +141,13 @@ def _folders_in(folder: str) -> Iterator[str]:
 def _rewritten(real: str, text: str, compiled: Iterable[Compiled]) -> str:
     """The text of a file with brackets where the editions differ, and with its line."""
     stretches: set[tuple[int, int]] = set()
-    starts = [0, *(line_end.end() for line_end in re.finditer("\n", text))]
+    source = Text("", text)
     for checked in compiled:
         for warning in (*checked.diagnostics, *(allowed for allowed, _ in checked.allowed)):
             first = next(edits(warning, checked.sources), None) if warning.code == CODE else None
             if first is not None and os.path.realpath(first[1].file) == real:
                 edit = first[1]
-                start, end = starts[edit.line - 1] + edit.column - 1, starts[edit.end_line - 1] + edit.end_column - 1
+                start, end = source.offset(edit.line, edit.column), source.offset(edit.end_line, edit.end_column)
                 if edit.text == f"({text[start:end]})":
                     stretches.add((start, end))
     marks = sorted([(end, 0, ")") for _, end in stretches] + [(start, 1, "(") for start, _ in stretches], reverse=True)
@@ -162,8 +162,7 @@ def _with_line(text: str) -> str:
     if source.heading is not None:
         start, end = source.heading.number
         return f"{text[:start]}{LATEST}{text[end:]}"
-    tokens = (token for line in logical_lines(source) for token in line)
-    first = next((token.offset for token in tokens if token.kind != SPACE), len(text))
+    first = next((token.offset for token in solid_tokens(source)), len(text))
     offset = text.rfind("\n", 0, first) + 1
     above = text[:offset].rstrip(" \t").rpartition("\n\n")
     if above[1] and above[0].strip() and above[2].strip():  # a comment of its own, below that of the file
@@ -180,10 +179,9 @@ def _with_line(text: str) -> str:
 def _depends_on_its_decks(text: str) -> bool:
     """Return True if a name in a file of edition 1 may be a unit, or a value of a deck that includes the file: one of
     the units that came later, other than directly behind a number."""
-    tokens = [token for line in logical_lines(Text("", text)) for token in line if token.kind != SPACE]
     return any(
         token.text in units.FURTHER_UNITS and before.kind not in NUMBERS
-        for before, token in pairwise(tokens)
+        for before, token in pairwise(solid_tokens(Text("", text)))
         if token.kind == NAME
     )
 

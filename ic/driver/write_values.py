@@ -16,7 +16,7 @@ from ic.driver.explain import explanations_of
 from ic.formatting.formatter import formatted
 from ic.grammar.syntax import Deck, Entry, Group, Let
 from ic.read import read
-from ic.text.lexer import Text, Token, logical_lines
+from ic.text.lexer import Text, solid_tokens
 from met.diagnostic import Place, Problem, error
 from met.frozen import frozen
 from met.plan.keys import structure_key
@@ -232,19 +232,14 @@ def _by_hand(value: WrittenValue, why: str) -> Problem:
 # The text
 
 
-def _tokens(source: Text) -> list[Token]:
-    return [token for line in logical_lines(source) for token in line]
-
-
 def _offset(source: Text, place: Place) -> int:
-    starts = [0, *(match.end() for match in re.finditer("\n", source.text))]
-    return starts[place.line - 1] + place.column - 1
+    return source.offset(place.line, place.column)
 
 
 def _extent(source: Text, entry: Entry) -> tuple[int, int]:
     """The range from the first character of an entry to its last one, a brace or a semicolon, exclusive."""
     first, depth = _offset(source, entry.place), 0
-    for token in _tokens(source):
+    for token in solid_tokens(source):
         if token.offset < first:
             continue
         depth += {"{": 1, "}": -1}.get(token.text, 0)

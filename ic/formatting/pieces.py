@@ -16,7 +16,7 @@ from ic.grammar.cursor import OPENING
 from ic.grammar.declared_units import TAKEN, declarations
 from ic.grammar.expressions import Expressions
 from ic.grammar.uses import USE
-from ic.text.lexer import END, NAME, NUMBERS, SPACE, STRING, WHOLE, Text, Token, logical_lines
+from ic.text.lexer import END, NAME, NUMBERS, SPACE, STRING, WHOLE, Text, Token, solid_tokens
 from ic.text.limits import Findings
 from met import units
 from met.units import ONE
@@ -217,6 +217,6 @@ def _stay_apart(before: str, after: str) -> bool:
     """Return True if the lexer still separates two texts when nothing stands between them."""
 
     def texts(text: str) -> list[str]:
-        return [token.text for line in logical_lines(Text("", text)) for token in line if token.kind != SPACE]
+        return [token.text for token in solid_tokens(Text("", text))]
 
     return texts(before + after) == [*texts(before), *texts(after)]

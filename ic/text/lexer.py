@@ -148,6 +148,10 @@ class Text:
             self.name, line, offset - start + 1, min(length, end - offset) or 1, expansions, self.included, self.used
         )
 
+    def offset(self, line: int, column: int) -> int:
+        """The offset of the character at a column of a line, both from 1."""
+        return self._starts[line - 1] + column - 1
+
     def indent(self, offset: int) -> int:
         """The column, from 1, of the first thing on the line that holds the token at `offset`."""
         before = self.text[self._starts[self.line(offset) - 1] : offset]
@@ -224,6 +228,11 @@ def logical_lines(source: Text) -> Iterator[list[Token]]:
     if len(source.joined) < len(source.text):
         lines = (_where_written(line, source) for line in lines)
     return lines
+
+
+def solid_tokens(source: Text) -> Iterator[Token]:
+    """The tokens of a text in order, as they stand there, without white space and comments."""
+    return (token for line in logical_lines(source) for token in line if token.kind != SPACE)
 
 
 def _where_written(line: list[Token], source: Text) -> list[Token]:
