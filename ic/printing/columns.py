@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from itertools import zip_longest
 
 from met.unit_parser import decimals
 
@@ -10,8 +11,7 @@ from met.unit_parser import decimals
 def columns(rows: Sequence[Sequence[str]], *, right: Iterable[int] = (), indent: str = "  ") -> list[str]:
     """The rows as lines with aligned columns; those with numbers in `right` are flush right."""
     flush = frozenset(right)
-    count = max((len(row) for row in rows), default=0)
-    widths = [max((_width(row[i]) for row in rows if i < len(row)), default=0) for i in range(count)]
+    widths = [max(map(_width, cells)) for cells in zip_longest(*rows, fillvalue="")]
     lines = []
     for row in rows:
         cells = [
