@@ -150,7 +150,7 @@ def _mesh(visual: Visual) -> Expression:
     named: list[tuple[Word, Expression]] = []
     for key, values, default, unit in placing:
         if values != default:
-            numbers = List(tuple(_plain(value, place) for value in values), place)
+            numbers = List(tuple(_signed(value, "", place) for value in values), place)
             named.append((Word(key, place), WithUnit(numbers, _unit(unit, place), place) if unit else numbers))
     return Call(_name("placed", place), (file,), tuple(named), None, place) if named else file
 
@@ -225,7 +225,7 @@ def _joint(joint: Joint, names: DeckNames, kinds: Mapping[str, str]) -> Group:
         settings.append(_setting("follows", _name(names.joints[leader.text], leader.place), leader.place))
         if multiplier != 1.0:
             unit = ratio_unit(kind, kinds[leader.text])
-            ratio = _signed(multiplier, unit, leader.place) if unit in UNITS else _plain(multiplier, leader.place)
+            ratio = _signed(multiplier, unit if unit in UNITS else "", leader.place)
             settings.append(_setting("ratio", ratio, leader.place))
         if offset:
             settings.append(_setting("offset", _signed(offset, way, leader.place), leader.place))
@@ -258,7 +258,7 @@ def _axis(axis: Numbers) -> Expression:
         return _name(AXES[x, y, z], axis.place)
     if (-x + 0.0, -y + 0.0, -z + 0.0) in AXES:
         return Unary("-", _name(AXES[-x + 0.0, -y + 0.0, -z + 0.0], axis.place), axis.place)
-    return List(tuple(_bare(value, axis.place) for value in axis.values), axis.place)
+    return List(tuple(_number(value, "", axis.place) for value in axis.values), axis.place)
 
 
 # Nodes of the syntax tree
@@ -277,24 +277,18 @@ def _vector(key: str, numbers: Numbers, unit: str) -> Setting:
     """The entry of three numbers with a unit, each with its place in the file."""
     place = numbers.place
     places = numbers.places or (place,) * len(numbers.values)
-    items = tuple(_bare(value, spot) for value, spot in zip(numbers.values, places, strict=True))
+    items = tuple(_number(value, "", spot) for value, spot in zip(numbers.values, places, strict=True))
     return _setting(key, WithUnit(List(items, place), _unit(unit, place), place), place)
 
 
 def _number(value: float, unit: str, place: Place) -> Number:
-    return Number(value, _unit(unit, place), place, spelled(value))
-
-
-def _plain(value: float, place: Place) -> Expression:
-    return _bare(value, place) if value >= 0.0 else Unary("-", _bare(-value, place), place)
+    """A number with a unit of `UNITS`, or "" for none; a negative one with its sign in the text."""
+    return Number(value, _unit(unit, place) if unit else None, place, spelled(value))
 
 
 def _signed(value: float, unit: str, place: Place) -> Expression:
+    """A number as `_number` makes it, the sign of a negative one before it."""
     return _number(value, unit, place) if value >= 0.0 else Unary("-", _number(-value, unit, place), place)
-
-
-def _bare(value: float, place: Place) -> Number:
-    return Number(value, None, place, spelled(value))
 
 
 def _unit(text: str, place: Place) -> Unit:
