@@ -270,7 +270,7 @@ def explain(
     setting of the run (rates.dynamics). Without PATH, `--scales` shows what the run's numbers are beside one another,
     and `--assumptions` what it leaves out.
     """
-    from ic.printing.explaining import Sources, explained_json, print_explained
+    from ic.printing.explain import Sources, explained_json, print_explained
     from ic.printing.reviewing import assumptions_json, print_assumptions, print_scales, scales_json
 
     check_options(deck, defines=defines, include_dirs=include_dirs, settings=settings)

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ic.printing.columns import columns, count, size
-from ic.printing.searches import budget
+from ic.printing.plan import budget
 from ic.sweeps.confidences import OF_CASES
 from met.plan import Coordinate, Experiment, keys
 from met.plan.columns import row_at

@@ -1,4 +1,4 @@
-"""A plan in words: the arm as a tree, rates, records, number of cases, and sizes."""
+"""A plan in words: the arm as a tree, rates, records, number of cases or the goal of a search, and sizes."""
 
 from __future__ import annotations
 
@@ -8,7 +8,6 @@ from collections.abc import Iterable, Iterator, Sequence
 import numpy as np
 
 from ic.printing.columns import columns, count, number, quantity, size, vector
-from ic.printing.searches import search_lines
 from ic.printing.settings import kept_keys
 from met import models
 from met.parameter import Parameter
@@ -16,6 +15,7 @@ from met.plan import BASE, Base, Experiment, Formula, Joint, Plan, Structure
 from met.plan.chains import chains
 from met.plan.columns import different, span
 from met.plan.defaults import OF_FREE_BASE, of_environment
+from met.plan.searches import Search
 from met.plan.uses import sensor_parts
 from met.substitution import bed_scale
 from met.unit_parser import decimals, written
@@ -450,3 +450,34 @@ def _cases(experiment: Experiment) -> Iterator[str]:
     if cases.seeds == "independent":
         rows.append(("seeds", "each case has noise of its own"))
     yield from columns(rows)
+
+
+def budget(search: Search) -> str:
+    """The goal with the number of cases: `maximise effort, in at most 2,000 cases`."""
+    return f"{search.goal}, in at most {count(search.at_most, 'case')}"
+
+
+def search_lines(experiment: Experiment, search: Search) -> Iterator[str]:
+    """The search in lines: its goal and its parameters."""
+    case_bytes = experiment.structure.history_bytes
+    histories = f"; {size(case_bytes)} of histories a case" if case_bytes else ""
+    yield f"{search.kind.capitalize()}: {budget(search)}{histories}"
+    rows = []
+    units = {coordinate.path: coordinate.unit for coordinate in experiment.cases.coordinates}
+    for each_parameter in search.parameters:
+        unit = units[each_parameter.path]
+        ends = f"{decimals([each_parameter.low], unit)[0]} to {written(each_parameter.high, unit)}"
+        rows.append((each_parameter.path, f"{ends}{', by equal ratios' * each_parameter.logarithmic}"))
+    yield from columns(rows)
+    if search.against:
+        borne = [coordinate.path for coordinate in experiment.cases.coordinates[len(search.parameters) :]]
+        yield f"  against {count(len(search.plants), 'case')} of {search.against}: {', '.join(borne)}"
+    if search.fresh:
+        yield f"  confirmed by {count(len(search.fresh), 'case')} of {search.confirms}"
+    if search.kind == "tune" and experiment.requirements:
+        required = ", ".join(requirement.text for requirement in experiment.requirements)
+        yield f"  with a margin of {100.0 * search.margin:g} % to the limits of {required}"
+    if search.steers:
+        yield f"  candidates keep a disk margin of {search.least_margin:g}"
+    elif search.kind == "tune" and not search.least_margin:
+        yield "  its stability is not judged"

@@ -18,7 +18,7 @@ from pathlib import Path
 import ic
 from ic.driver.compile import Compiled
 from ic.find import standard_decks
-from ic.printing.explaining import print_explained
+from ic.printing.explain import print_explained
 from ic.sweeps.choices import OF_RUN
 from met.diagnostic import Problem
 from met.plan import Formula
