@@ -17,6 +17,7 @@ from met.units import Measure
 
 OPENING = {"(": ")", "[": "]", "{": "}"}
 SHOWN = 40  # characters of a token in a message
+NOT_OPEN = "leave it out, or open it where it begins"  # the help for a bracket that closes nothing
 
 
 class Unreadable(Exception):
@@ -146,6 +147,25 @@ class Cursor:
             self.fail("D022", f"expected {expected}, found {token_in_words(self.token)}", self.token, also=(label,))
         self.open.pop()
         return self.advance()
+
+    def never_closed(self) -> NoReturn:
+        """Report the last open bracket as not closed (D022), and raise EndedInsideBlock."""
+        also = [Label(self.behind(self.previous), "the deck ends here")]
+        opening = self.open[-1]
+        if self.misindented is not None:
+            inner, closing = self.misindented
+            also = [
+                Label(inner.place, f"perhaps this one: the `}}` on line {closing.line} that closes it is indented less")
+            ]
+        self.unbalanced = True
+        self.tell(
+            "D022",
+            f"this `{opening.text}` is not closed",
+            opening,
+            also=also,
+            help=f"write the `{OPENING[opening.text]}` where it ends",
+        )
+        raise EndedInsideBlock
 
     def count_operator(self) -> None:
         """Count an operator of the present expression. Raises GiveUp beyond `MOST_OPERATORS` (D029)."""

@@ -8,7 +8,7 @@ from __future__ import annotations
 import re
 
 from ic.grammar.braced_names import USAGE, adjacent, braces_length, name_length
-from ic.grammar.cursor import SHOWN, span, token_in_words
+from ic.grammar.cursor import NOT_OPEN, SHOWN, Unreadable, span, token_in_words
 from ic.grammar.quantities import Quantities
 from ic.grammar.syntax import (
     Binary,
@@ -24,7 +24,7 @@ from ic.grammar.syntax import (
     WithUnit,
     Word,
 )
-from ic.text.lexer import BAD, NAME, NUMBERS, STRING, WHOLE, Token
+from ic.text.lexer import BAD, END, NAME, NUMBERS, STRING, WHOLE, Token
 from ic.text.limits import LONGEST_NUMBER, LONGEST_STRING
 from met import units
 from met.diagnostic import Label, write
@@ -365,7 +365,56 @@ class Expressions(Quantities):
             self.unexpected(f"`,` or `{closing}`", help=write("==", compare) if closing == ")" else compare)
         return False
 
+    def semicolon(self, value: Expression, *, may_open: bool = False) -> None:
+        """Read an entry's `;`; one missing at a line's end is noted. may_open: it may be a block's head without `{`."""
+        token = self.token
+        if token.text == ";":
+            self.advance()
+            return
+        if isinstance(value, Call) and value.body is not None:
+            return
+        if token.kind == BAD:
+            raise Unreadable
+        if may_open and isinstance(value, Name):
+            self.unopened.append(self.behind(self.previous))
+        begins_next = token.kind == NAME and self.following.text in ("=", "+=", "{", ".")
+        if token.text == "}" or token.kind == END or self.on_new_line(self.position) or begins_next:
+            self.tell(
+                "D021",
+                "expected `;`",
+                self.behind(self.previous),
+                help=write(";", "an entry ends with `;`", where="before"),
+            )
+            return
+        another = self.following.kind == NAME and self.tokens[self.position + 2].text in ("=", "+=")
+        if token.text == "," and (another or self.on_new_line(self.position + 1) or self.following.text == "}"):
+            self.tell("D024", "`,` at the end of an entry", token, help=write(";"))
+            self.advance()
+            return
+        if token.text in (")", "]"):
+            self.unbalanced = True
+            self.fail("D022", f"this `{token.text}` closes nothing", token, help=NOT_OPEN)
+        helps = {
+            "=": "to compare, write `==`; to set two things, write two entries",
+            "..": "a range is written `first .. last by step`",
+            ",": self.decimal_comma() or "a list stands in brackets: `[a, b]`",
+            "?": "there is no `?:` in a deck; `#if` chooses between builds",
+        }
+        self.unexpected(
+            "`;`" if token.kind in (*NUMBERS, STRING, NAME) else "`;` or an operator", help=helps.get(token.text, ())
+        )
+
+    def decimal_comma(self) -> str:
+        """The remedy for `0,325`; "" where the comma has another meaning."""
+        whole, part = self.previous, self.following
+        if not (whole.kind == part.kind == WHOLE and whole.end == self.token.offset and self.token.end == part.offset):
+            return ""
+        remedy = f"a number has a decimal point: `{whole.text}.{part.text}`"
+        if len(part.text) == 3 and whole.text != "0":
+            remedy += f"; thousands have no mark: `{whole.text}{part.text}`"
+        return remedy
+
     def ends_entry(self) -> bool:
         """Return True if the semicolon here ends the entry, so that only the closing bracket is missing."""
         after = self.following
-        return after.text == "}" or after.kind == "END" or self.begins_entry(self.position + 1)
+        return after.text == "}" or after.kind == END or self.begins_entry(self.position + 1)

@@ -9,12 +9,11 @@ stages see plain names, and messages know the loop and the value of its index.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import NoReturn
 
 from ic.grammar.braced_names import USAGE, NoName, NotWhole, filled, name_length, whole
 from ic.grammar.cursor import OPENING, span, token_in_words
 from ic.grammar.expressions import EVERY_JOINT, Expressions
-from ic.grammar.syntax import Entry, Expression, Group, Setting, Word
+from ic.grammar.syntax import Entry, Group, Setting, Word
 from ic.text.lexer import BAD, END, NAME, Token
 from ic.text.limits import MOST_ITERATIONS, MOST_LOOPED, Findings, GiveUp
 from ic.text.source import UnreadableStretch
@@ -39,12 +38,6 @@ class Loops(Expressions):
         self.looped = [0]  # tokens of all iterations so far, of the whole deck
 
     def entries(self, into: list[Entry]) -> None:
-        raise NotImplementedError
-
-    def semicolon(self, value: Expression) -> None:
-        raise NotImplementedError
-
-    def never_closed(self) -> NoReturn:
         raise NotImplementedError
 
     # loops

@@ -18,9 +18,8 @@ from contextlib import suppress
 from dataclasses import field
 from itertools import pairwise, takewhile
 from types import MappingProxyType
-from typing import NoReturn
 
-from ic.grammar.cursor import OPENING, SHOWN, EndedInsideBlock, Unreadable, span, token_in_words
+from ic.grammar.cursor import NOT_OPEN, SHOWN, EndedInsideBlock, Unreadable, span, token_in_words
 from ic.grammar.declared_units import UNIT, is_declaration
 from ic.grammar.syntax import (
     Broken,
@@ -38,7 +37,7 @@ from ic.grammar.syntax import (
 )
 from ic.grammar.uses import Uses
 from ic.text.edition import EDITION_WORD
-from ic.text.lexer import BAD, COMMAND_LINE, END, NAME, NUMBERS, STRING, WHOLE, Token
+from ic.text.lexer import BAD, COMMAND_LINE, END, NAME, NUMBERS, STRING, Token
 from ic.text.limits import Findings, GiveUp, without_collection
 from ic.text.source import UnreadableStretch
 from met import units
@@ -52,8 +51,6 @@ DEFINED_IN_PARTS = ("arm", "link", "joint", "loop", "servo", "run", "substitute"
 PARAM = "param"
 LETS = ("let", PARAM)
 _OVER_CASES = "write `require METRIC < LIMIT in 99 % of cases with 90 % confidence;`"
-_SEMICOLON = "an entry ends with `;`"
-_NOT_OPEN = "leave it out, or open it where it begins"
 
 
 @frozen
@@ -197,25 +194,6 @@ class _Parser(Uses):
                 self.misindented = (opening, closing)
         return tuple(body)
 
-    def never_closed(self) -> NoReturn:
-        """Report the last open bracket as not closed (D022), and raise EndedInsideBlock."""
-        also = [Label(self.behind(self.previous), "the deck ends here")]
-        opening = self.open[-1]
-        if self.misindented is not None:
-            inner, closing = self.misindented
-            also = [
-                Label(inner.place, f"perhaps this one: the `}}` on line {closing.line} that closes it is indented less")
-            ]
-        self.unbalanced = True
-        self.tell(
-            "D022",
-            f"this `{opening.text}` is not closed",
-            opening,
-            also=also,
-            help=f"write the `{OPENING[opening.text]}` where it ends",
-        )
-        raise EndedInsideBlock
-
     def closes_nothing(self) -> None:
         """Report a `}` too many, with the place where a `{` may be missing; what was reported there follows from it."""
         token = self.advance()
@@ -225,7 +203,7 @@ class _Parser(Uses):
             self.findings.withdraw("D021", self.unopened.pop())
         elif self.closed_within_line is not None:
             also = [Label(self.closed_within_line.place, "perhaps the `{` to this one is missing")]
-        self.tell("D022", f"this `{token.text}` closes nothing", token, also=also, help=_NOT_OPEN)
+        self.tell("D022", f"this `{token.text}` closes nothing", token, also=also, help=NOT_OPEN)
 
     # entries
 
@@ -307,7 +285,7 @@ class _Parser(Uses):
         token = self.token
         if token.text in (")", "]"):
             self.unbalanced = True
-            self.fail("D022", f"this `{token.text}` closes nothing", token, help=_NOT_OPEN)
+            self.fail("D022", f"this `{token.text}` closes nothing", token, help=NOT_OPEN)
         if token.text == "{":
             self.unexpected("a name before the block", help="a block is written `kind name { ... }`")
         if token.text == "*=":
@@ -494,50 +472,6 @@ class _Parser(Uses):
                 raise Unreadable
             self.fail("D020", f"expected {wanted} after `{last.text[:40]}`", self.behind(last))
         self.unexpected(f"{wanted} after `{last.text[:40]}`")
-
-    def semicolon(self, value: Expression, *, may_open: bool = False) -> None:
-        """Read an entry's `;`; one missing at a line's end is noted. may_open: it may be a block's head without `{`."""
-        token = self.token
-        if token.text == ";":
-            self.advance()
-            return
-        if isinstance(value, Call) and value.body is not None:
-            return
-        if token.kind == BAD:
-            raise Unreadable
-        if may_open and isinstance(value, Name):
-            self.unopened.append(self.behind(self.previous))
-        begins_next = token.kind == NAME and self.following.text in ("=", "+=", "{", ".")
-        if token.text == "}" or token.kind == END or self.on_new_line(self.position) or begins_next:
-            self.tell("D021", "expected `;`", self.behind(self.previous), help=write(";", _SEMICOLON, where="before"))
-            return
-        another = self.following.kind == NAME and self.tokens[self.position + 2].text in ("=", "+=")
-        if token.text == "," and (another or self.on_new_line(self.position + 1) or self.following.text == "}"):
-            self.tell("D024", "`,` at the end of an entry", token, help=write(";"))
-            self.advance()
-            return
-        if token.text in (")", "]"):
-            self.unbalanced = True
-            self.fail("D022", f"this `{token.text}` closes nothing", token, help=_NOT_OPEN)
-        helps = {
-            "=": "to compare, write `==`; to set two things, write two entries",
-            "..": "a range is written `first .. last by step`",
-            ",": self.decimal_comma() or "a list stands in brackets: `[a, b]`",
-            "?": "there is no `?:` in a deck; `#if` chooses between builds",
-        }
-        self.unexpected(
-            "`;`" if token.kind in (*NUMBERS, STRING, NAME) else "`;` or an operator", help=helps.get(token.text, ())
-        )
-
-    def decimal_comma(self) -> str:
-        """The remedy for `0,325`; "" where the comma has another meaning."""
-        whole, part = self.previous, self.following
-        if not (whole.kind == part.kind == WHOLE and whole.end == self.token.offset and self.token.end == part.offset):
-            return ""
-        remedy = f"a number has a decimal point: `{whole.text}.{part.text}`"
-        if len(part.text) == 3 and whole.text != "0":
-            remedy += f"; thousands have no mark: `{whole.text}{part.text}`"
-        return remedy
 
 
 def _word(token: Token) -> Word:
