@@ -337,14 +337,17 @@ class _Preprocessor(Macros):
         """Read an included file. Its tokens go straight to the output, since pcpp has handed over all before them."""
         directive = self._directive
         assert directive is not None
-        header = self._header(tokens, directive)
-        if header is None:
-            return ()
-        name, angled, place = header
+        with self.findings.gather():
+            self._include(directive, *self._header(tokens, directive))
+        return ()
+
+    def _include(self, directive: Token, name: str, angled: bool, place: Place) -> None:
+        """Read the file of this name, in < > if it is angled, unless it is not to be read again. place: of the name.
+        What keeps it from being read is reported, or raised as Problem."""
         includer, source = self._including[-1]
         file = find_file(self.files, self.findings, includer, name, angled, place)
         if file is None or file.identity in self._once:
-            return ()
+            return
         self._included += 1
         if len(self._including) > INCLUDE_DEPTH:
             self._too_deep(place)
@@ -355,13 +358,11 @@ class _Preprocessor(Macros):
         try:
             text = self.files.text(file)
         except Problem as problem:
-            self.findings.add(*(reached_by(d, place, included, used) for d in problem.diagnostics))
-            return ()
+            raise Problem(reached_by(d, place, included, used) for d in problem.diagnostics) from None
         self._read(file, Text(file.name, text, included, used), place)
-        return ()
 
-    def _header(self, tokens: list[Token], directive: Token) -> tuple[str, bool, Place] | None:
-        """The name in an `#include`, whether in < >, and its place."""
+    def _header(self, tokens: list[Token], directive: Token) -> tuple[str, bool, Place]:
+        """The name in an `#include`, whether in < >, and its place. Raises Problem D005 where there is none."""
         if tokens and tokens[0].kind == STRING:
             name, angled, place, rest = tokens[0].text[1:-1], False, tokens[0].place, tokens[1:]
         elif tokens and tokens[0].text == "<":
@@ -372,21 +373,14 @@ class _Preprocessor(Macros):
             )
             end = written.find(">")
             if end < 0:
-                self.findings.error("D005", "`#include <` without its `>`", first.place, help=_INCLUDES)
-                return None
+                raise Problem(error("D005", "`#include <` without its `>`", first.place, help=_INCLUDES))
             name, angled, place = written[1:end], True, first.source.place(first.offset, end + 1, first.expansions)
             rest = tokens[close + 1 :] if close is not None else []
         else:
-            self.findings.error(
-                "D005",
-                "`#include` needs a file",
-                tokens[0].place if tokens else directive.place,
-                help=_INCLUDES,
-            )
-            return None
+            place = tokens[0].place if tokens else directive.place
+            raise Problem(error("D005", "`#include` needs a file", place, help=_INCLUDES))
         if not name.strip():
-            self.findings.error("D005", "`#include` needs a file, and this name is empty", place, help=_INCLUDES)
-            return None
+            raise Problem(error("D005", "`#include` needs a file, and this name is empty", place, help=_INCLUDES))
         self._nothing_after(rest, "#include")
         return name, angled, place
 
