@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from functools import cached_property
+from itertools import pairwise
 
 from ic.grammar.cursor import Cursor, span
 from ic.grammar.syntax import Binary, Expression, Name, Number, Unary
@@ -26,10 +27,9 @@ class EditionDifferences(Cursor):
     @cached_property
     def names_of_units(self) -> frozenset[str]:
         """Names of further units that the deck uses for something else: they stand where no unit can stand."""
-        pairs = zip(self.tokens, self.tokens[1:], strict=False)
         return frozenset(
             token.text
-            for before, token in pairs
+            for before, token in pairwise(self.tokens)
             if token.text in units.FURTHER_UNITS
             and token.kind == NAME
             and before.kind not in NUMBERS
@@ -39,10 +39,9 @@ class EditionDifferences(Cursor):
     @cached_property
     def values_of_files(self) -> Mapping[tuple[str, str], Token]:
         """The names that values and indices of loops get, by file and name."""
-        pairs = zip(self.tokens, self.tokens[1:], strict=False)
         return {
             (token.source.name, token.text): token
-            for before, token in pairs
+            for before, token in pairwise(self.tokens)
             if before.text in ("let", "param", "for") and token.kind == NAME
         }
 

@@ -6,7 +6,7 @@ from collections.abc import Callable, Container, Sequence
 
 from ic.text.lexer import BAD, COMMAND_LINE, NAME, NUMBERS, PASTE, SPACE, Token, complain_of_stray
 from ic.text.limits import LONGEST_NAME, MOST_MACRO_BODY, Findings
-from ic.text.substitute import OPTIONAL, REST, Macro, closing
+from ic.text.substitute import OPTIONAL, REST, Macro, closing, stripped
 from met import units
 from met.diagnostic import Help, Label, Problem, error, write
 
@@ -268,11 +268,9 @@ def trimmed(body: list[Token]) -> list[Token]:
     """The body without white space at its ends and beside `##`."""
     tokens: list[Token] = []
     for token in body:
-        if token.kind == SPACE and (not tokens or tokens[-1].kind == PASTE):
+        if token.kind == SPACE and tokens and tokens[-1].kind == PASTE:
             continue
         while token.kind == PASTE and tokens and tokens[-1].kind == SPACE:
             tokens.pop()
         tokens.append(token)
-    while tokens and tokens[-1].kind == SPACE:
-        tokens.pop()
-    return tokens
+    return stripped(tokens)

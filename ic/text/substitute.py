@@ -138,7 +138,7 @@ class _Substitution:
             return []
         inside = body[_solid(body, position + 1) + 1 : end - 1]
         self.optional_depth += 1
-        tokens = _stripped(self.of(_stripped(inside)))
+        tokens = stripped(self.of(stripped(inside)))
         self.optional_depth -= 1
         return tokens
 
@@ -216,7 +216,7 @@ def _solid(body: Sequence[Token], position: int) -> int:
     return position
 
 
-def _stripped(tokens: list[Token]) -> list[Token]:
+def stripped(tokens: list[Token]) -> list[Token]:
     """The tokens without white space at their ends."""
     first, last = 0, len(tokens)
     while first < last and tokens[first].kind == SPACE:
