@@ -105,9 +105,8 @@ def _values(compiled: Compiled) -> Iterator[ValueInDeck]:
             if key in seen:
                 continue
             seen.add(key)
-            yield ValueInDeck(
-                path, _settled_text(settled), tuple(_origins(settled, experiment.name)), settled.doc, place
-            )
+            text = _text(None if isinstance(settled.value, Scalar) else settled.value, settled.unit)
+            yield ValueInDeck(path, text, tuple(_origins(settled, experiment.name)), settled.doc, place)
         for name in scope.definitions.lets if number == 0 else ():
             for explained in explanations_of(compiled, name):
                 if explained.path == name and explained.place is not None:
@@ -115,10 +114,6 @@ def _values(compiled: Compiled) -> Iterator[ValueInDeck]:
                     text = _text(value if not explained.varies else None, explained.unit)
                     yield ValueInDeck(name, text, (f"written `{explained.written}`",), explained.doc, explained.place)
                     break
-
-
-def _settled_text(settled: Settled) -> str:
-    return _text(None if isinstance(settled.value, Scalar) else settled.value, settled.unit)
 
 
 def _text(value: float | tuple[float, ...] | str | None, unit: str) -> str:

@@ -18,13 +18,16 @@ from ic.editor.names import NameInText, NamesInTexts
 from ic.editor.structure import DeckText
 from ic.language import BLOCKS
 from ic.meaning.expressions.evaluate import CONSTANTS, FUNCTIONS
-from ic.text.lexer import NAME, Token
+from ic.text.lexer import COMMAND_LINE, NAME, Token
 from met.frozen import frozen
 from met.plan.codec import encode
 from met.units import is_unit
 
 WORDS = ("for", "in", "let", "param", "like", "of", "from", "and", "or", "not", "when", "default", "base")
 """Words of the grammar, which name nothing."""
+
+NO_DECKS = (".csv", ".urdf", ".xacro")
+"""The endings of files that decks name and that are not decks."""
 
 NO_RUN = "D161"
 """The error of a text that is a part of decks and not a deck."""
@@ -100,17 +103,14 @@ class _Deck:
         self.request = request
         self.compiled = _compiled(request)
         texts = self.compiled.sources
-        self.names = NamesInTexts(DeckText(name, text) for name, text in texts.items() if _is_deck(name))
+        decks = (name for name in texts if not name.endswith(NO_DECKS) and name != COMMAND_LINE)
+        self.names = NamesInTexts(DeckText(name, texts[name]) for name in decks)
 
     def path(self, name: str) -> str:
         """The real path of a file that its places name; "" of a text in no file."""
         if self.request.text is not None and name == next(iter(self.compiled.sources)):
             return ""
         return os.path.realpath(os.path.join(self.request.folder, name))
-
-
-def _is_deck(name: str) -> bool:
-    return not name.endswith((".csv", ".urdf", ".xacro")) and name != "<command line>"
 
 
 def _compiled(request: CheckRequest) -> Compiled:

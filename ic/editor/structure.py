@@ -384,7 +384,7 @@ class DeckText:
         """The offset of a column of a line, both counted from 0."""
         lines = self.source.text.split("\n")
         line = min(line, len(lines) - 1)
-        return sum(len(text_line) + 1 for text_line in lines[:line]) + min(column, len(lines[line]))
+        return self.source.offset(line + 1, 1) + min(column, len(lines[line]))
 
 
 class DecksUsed:

@@ -10,6 +10,7 @@ import shlex
 import stat
 import sys
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 
 from ic.formatting.formatter import formatted
 from ic.text.files import Files, FoundFile, decode
@@ -65,11 +66,8 @@ def _included(text: str, file: FoundFile, files: Files) -> Iterator[FoundFile]:
 
 def _text(file: FoundFile) -> str:
     """The readable part of a file; `met check` reports its errors."""
-    try:
-        with open_regular(file.path) as stream:
-            return stream.read(MOST_BYTES).decode("utf-8", "replace")
-    except OSError:
-        pass
+    with suppress(OSError), open_regular(file.path) as stream:
+        return stream.read(MOST_BYTES).decode("utf-8", "replace")
     return ""
 
 

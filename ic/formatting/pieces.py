@@ -152,16 +152,14 @@ def _unit(parser: Expressions, position: int, before: RowPiece) -> int:
     over = None
     if token.kind == WHOLE and token.text == "1" and following.text == "/":
         over = parser.unit_factor(position + 2, -1, 0)
-    if over is None and not ((token.kind == NAME or token.text == "%") and _is_unit(token, parser)):
+    if over is None and not (
+        (token.kind == NAME or token.text == "%") and (token.text in units.ALL_UNITS or token.text in parser.declared)
+    ):
         return 0
     if before.kind == "name" and following.text not in ("*", "/", "^"):  # a macro's name, perhaps: `TEETH V*s/rad`
         return 0
     product = parser.unit_product(position, 1, 0, over)
     return 0 if product is None else product[1] - position
-
-
-def _is_unit(token: Token, parser: Expressions) -> bool:
-    return token.text in units.ALL_UNITS or token.text in parser.declared
 
 
 def blanks_between(before: RowPiece, piece: RowPiece) -> int:

@@ -83,9 +83,6 @@ class _Rows:
         self._chosen = [{choice.path: choice.value for choice in group.cases.choices} for group in groups]
         self._columns: list[dict[str, Coordinate]] = [{c.path: c for c in g.cases.coordinates} for g in groups]
 
-    def chosen(self, position: int) -> dict[str, str]:
-        return self._chosen[self.groups[position]]
-
     def value(self, position: int, path: str) -> float | None:
         """A coordinate in SI; None where this case has no such coordinate."""
         coordinate = self._columns[self.groups[position]].get(path)
@@ -97,7 +94,7 @@ class _Rows:
 
     def cells(self, position: int) -> list[str]:
         """Cells of the row after its id."""
-        cells = [self.chosen(position).get(path, "") for path in self.choices]
+        cells = [self._chosen[self.groups[position]].get(path, "") for path in self.choices]
         values = [(self.value(position, path), unit) for path, unit in self.coordinates]
         cells += ["" if value is None else decimals([value], unit)[0] for value, unit in values]
         return [*cells, *([str(self.repeat(position))] if self.repeated else [])]
