@@ -99,7 +99,7 @@ def with_all_settings(compiled: Compiled, number: int = 0) -> Experiment:
 
 
 def explanations_of(compiled: Compiled, target: str) -> Iterator[Explanation]:
-    """Where each value of the path `target` comes from, in every experiment of a compiled deck; of a vector, each
+    """The origin of each value of the path `target`, in every experiment of a compiled deck; of a vector, of each
     component."""
     assert compiled.plan is not None
     for experiment, scope in zip(compiled.plan.experiments, compiled.scopes, strict=True):

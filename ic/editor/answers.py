@@ -61,6 +61,8 @@ class AskedPosition:
         uri: str,
         position: types.Position,
     ) -> None:
+        """checks: of all open decks; codec: for the editor's units of columns; address: of a file of a deck by its
+        name; uri: of the open text"""
         self._checks, self._codec = checks, codec
         self._deck = deck = checks.deck_of(uri)
         opened = checks.texts.get(uri)
@@ -131,7 +133,7 @@ class AskedPosition:
         return types.Hover(contents, self.location(token).range)
 
     def definitions(self) -> list[types.Location]:
-        """Where the word here is defined, or the file that an include names."""
+        """The places where the word here is defined, or the beginning of the file that an include names."""
         included = self._included()
         if included is not None:
             beginning = types.Position(0, 0)

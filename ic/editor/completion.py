@@ -112,7 +112,7 @@ def _has_indices(word: str, indices: Collection[str]) -> bool:
 
 
 def _of_directive(line: str, files: Iterable[str]) -> list[Offer]:
-    """What may stand behind `#` on a line: a directive, or a file behind `#include`."""
+    """The words that may stand behind a `#` that begins a line: directives, or files behind `#include`."""
     word, _, rest = line.lstrip().removeprefix("#").lstrip().partition(" ")
     if word == "include" or word.startswith(("include<", 'include"')):
         rest = rest or word.removeprefix("include")

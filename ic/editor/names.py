@@ -197,6 +197,7 @@ class NamesInTexts:
     def __init__(
         self, texts: Iterable[DeckText], names_by_owner: Mapping[tuple[str, str], Sequence[str]] = NO_NAMES
     ) -> None:
+        """Find all definitions of the texts of one deck. names_by_owner: as of the class"""
         self._names_by_owner = names_by_owner
         self.texts = tuple(texts)
         self.used = DecksUsed(self.texts)

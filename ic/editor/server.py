@@ -45,6 +45,7 @@ class DeckServer(LanguageServer):
     """A language server with its knowledge of decks."""
 
     def __init__(self, include_dirs: Iterable[str], defines: Iterable[str], last_runs: FindLastRuns | None) -> None:
+        """include_dirs, defines: as of `-I` and `-D`; last_runs: reads archives, for lenses"""
         super().__init__("met", VERSION, text_document_sync_kind=types.TextDocumentSyncKind.Full)
         self.process = CheckerProcess()
         self.checks = DeckChecks(

@@ -323,6 +323,7 @@ class DeckText:
     """A text with its tokens, entries and preprocessor lines."""
 
     def __init__(self, name: str, text: str) -> None:
+        """name: of the text, as places of its deck call it"""
         self.source = Text(name, text)
         self.tokens: list[Token] = []  # of the deck itself
         self.comments: list[Token] = []
@@ -388,12 +389,14 @@ class DeckText:
 
 
 class DecksUsed:
-    """Which texts a name may be of: those that includes connect, and behind roofs those that these stand for.
+    """The texts in which a name of a text may be defined: those that includes connect with it, and behind the roof of a
+    used deck those of that deck.
 
     A text that no other one is seen to include or use, for a macro names its file, counts as a part of the first.
     """
 
     def __init__(self, texts: Sequence[DeckText]) -> None:
+        """texts: those of one deck, its own first"""
         self._uses = {text.source.name: text.uses for text in texts}
         self._seen = {name: {name} for name in self._uses}
         reached: set[str] = set()

@@ -47,6 +47,8 @@ def span(first: Token, last: Token) -> Place:
 
 
 class Cursor:
+    """The lowest part of the parser: the present token, the brackets that are open, messages, and recovery."""
+
     def __init__(self, tokens: Sequence[Token], findings: Findings) -> None:
         """tokens: of the deck, the last of kind END; findings: where mistakes are reported"""
         last = tokens[-1]

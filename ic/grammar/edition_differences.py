@@ -21,6 +21,8 @@ from met.diagnostic import Help, Label, Place, write
 
 
 class EditionDifferences(Cursor):
+    """The part of the parser that warns about, or refuses, what the editions of the language read differently."""
+
     units_alone = False
     """True where a unit is declared here, so that no name can be a value's."""
 

@@ -42,6 +42,8 @@ _ESCAPES = {'"': '"', "\\": "\\", "n": "\n", "t": "\t"}
 
 
 class Expressions(Quantities):
+    """The part of the parser for values: expressions, calls and lists, and what ends them."""
+
     def block(self) -> tuple[Entry, ...]:
         raise NotImplementedError
 

@@ -111,6 +111,8 @@ def parse_expression(tokens: Sequence[Token], findings: Findings) -> Expression 
 
 
 class _Parser(Uses):
+    """The parser of a deck's entries, on top of its parts for values, loops, units and used decks."""
+
     closed_within_line: Token | None = None  # a `}` that ends a block and a line that has not begun with it
 
     def entries(self, into: list[Entry]) -> None:
@@ -179,6 +181,8 @@ class _Parser(Uses):
         return [Setting(_words(names[:-1]), _words(path), operator, value, span(names[0], path[-1]))]
 
     def block(self) -> tuple[Entry, ...]:
+        """The entries of a block, from its `{` to its `}`. Notes what may explain a brace that is missing elsewhere: a
+        `}` that is indented less than the line of its `{`, and one that stands behind other tokens on its line."""
         opening = self.enter()
         body: list[Entry] = []
         outer = self.begin_items()
@@ -348,6 +352,8 @@ class _Parser(Uses):
         return Let(_word(name), value, span(names[0], name), names[0].text == PARAM)
 
     def setting(self, names: list[Token], tail: list[Token]) -> Setting:
+        """Read `NAMES.TAIL = VALUE;`, of which the names are read; all but the last are words. tail: the rest of the
+        path behind the last name. Raises Unreadable."""
         operator = self.advance()
         words, path = names[:-1], [names[-1], *tail]
         if words and words[0].text in COMPARE and operator.text == "=":

@@ -23,6 +23,8 @@ MOST_FACTORS = 32
 
 
 class Quantities(EditionDifferences):
+    """The part of the parser for numbers and units."""
+
     def number(self) -> Expression:
         """Read a number, and the unit that may follow it. Raises Unreadable."""
         token = self.advance()

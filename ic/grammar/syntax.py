@@ -70,6 +70,8 @@ class Number:
 
 @frozen
 class String:
+    """A text in quotes: its characters, without the quotes and with escapes replaced."""
+
     value: str
     place: Place
 
@@ -101,6 +103,8 @@ class Indexed:
 
 @frozen
 class List:
+    """Values in square brackets, `[1, 2 m]`."""
+
     items: tuple[Expression, ...]
     place: Place
 
@@ -137,6 +141,8 @@ class Range:
 
 @frozen
 class Unary:
+    """An operator before its one operand: `-x`, `not c`."""
+
     operator: str  # "-" "+" "not"
     operand: Expression
     place: Place

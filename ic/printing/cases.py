@@ -68,6 +68,7 @@ class _Rows:
     """The rows of all groups of a sweep, by position in its table, or those at some ascending positions."""
 
     def __init__(self, groups: Sequence[Experiment], positions: Sequence[int] | None = None) -> None:
+        """groups: those of one sweep; positions: None for all rows"""
         rows = [np.arange(g.cases.count) if positions is None else _rows_at(g, positions) for g in groups]
         everything = np.concatenate([group.cases.table[own] for group, own in zip(groups, rows, strict=True)])
         order = np.argsort(everything, kind="stable")

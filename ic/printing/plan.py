@@ -243,7 +243,7 @@ def passive(structure: Structure) -> list[str]:
 
 
 def _moves(joint: Joint, values: _Values) -> str:
-    """How a joint moves, in words: revolute or prismatic, its axis, and the pivot if it has one."""
+    """The motion of a joint in words: revolute or prismatic, its axis, and the pivot if it has one."""
     if joint.kind == "fixed":
         return "fixed"
     axis = values.vector(f"{joint.name}.axis")

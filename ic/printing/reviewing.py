@@ -35,7 +35,7 @@ def _row(assumption: Assumption) -> tuple[str, ...]:
 
 
 def assumptions_json(compiled: Compiled) -> list[dict[str, Any]]:
-    """The same for programs, a list a run."""
+    """The assumptions of each run or sweep in its first case, for programs."""
     assert compiled.plan is not None
     return [
         {"run": experiment.name, "assumptions": [asdict(assumption) for assumption in assumptions(experiment)]}
@@ -80,7 +80,7 @@ def _numbers(scale: Scale) -> str:
 
 
 def scales_json(compiled: Compiled) -> list[dict[str, Any]]:
-    """The same for programs, a list a run."""
+    """All numbers of each run or sweep that are compared with what is usual, for programs."""
     assert compiled.plan is not None
     return [
         {

@@ -66,7 +66,7 @@ def block_page(block: BlockDeclaration) -> Page:
 
 
 def in_block(block: BlockDeclaration) -> str:
-    """Where the entries of a block stand, in words."""
+    """A block in words, as the place of its entries: `a deck`, `an arm`, `any block`."""
     return {"deck": "a deck", "anywhere": "any block"}.get(block.name) or with_article(block.name)
 
 

@@ -29,7 +29,7 @@ _ENDLESS = re.compile(r"([+-]?)inf(?:inity)?", re.ASCII | re.IGNORECASE)
 
 @frozen
 class Attribute:
-    """How an attribute is read.
+    """The form of an attribute of URDF.
 
     count         how many numbers it holds; 0 stands for a word
     needed        whether its element must have it

@@ -67,7 +67,7 @@ class RobotEntry:
 
     @property
     def weighs(self) -> bool:
-        """Whether it is a link for which the file has inertia."""
+        """True for a link whose inertia the file has."""
         return isinstance(self.source, Link) and self.source.inertial is not None
 
 
@@ -105,7 +105,8 @@ def arm_entries(robot: Robot) -> ArmEntries:
 
 
 def _notes(robot: Robot) -> Iterator[tuple[Place, str]]:
-    """Where an arm's entries do not come from the robot's file as they stand: places, each with the reason."""
+    """The places of a robot's file whose text is not the number that the arm's entries have from there, each with the
+    reason."""
     for link in robot.links:
         inertial = link.inertial
         if inertial is None:

@@ -34,7 +34,8 @@ def without_mimics(robot: Robot, treatment: Treatment) -> Robot:
 
 
 def position(joint: Joint, known: dict[str, Joint]) -> float:
-    """Where the joint is at the start: a follower where its leader puts it. known: all joints by name"""
+    """The position of a joint at the start, rad or m; a follower is where its leader puts it. known: all joints by
+    name"""
     chain = [joint]
     while (mimic := chain[-1].mimic) is not None:
         chain.append(known[mimic.joint.text])

@@ -211,6 +211,8 @@ def _frame(part: Mapping[str, Any], place: Place) -> tuple[Numbers, Numbers]:
 
 
 def _joint(joint: Mapping[str, Any], name: Written, parent: Written, child: Written, has_key: bool) -> Joint:
+    """The joint of an arm from one of MuJoCo's model (`mjcf_model.compiled_model`), SI. has_key: whether a keyframe
+    gives all positions at the start, so that one of 0 counts too"""
     place, ends = name.place, joint["range"] or ()
     limits = {end: Numbers((value,), place) for end, value in zip(("lower", "upper"), ends, strict=False)}
     limits |= {"effort": Numbers((joint["effort"],), place)} if joint["effort"] else {}

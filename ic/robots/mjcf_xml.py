@@ -143,6 +143,7 @@ class MjcfSource:
     """
 
     def __init__(self, root: Element, folder: str) -> None:
+        """root: the whole model, its includes in their places; folder: that of its file. Raises Problem"""
         self._folder, self._settings = folder, dict[str, str]()
         for compiler in root.all("compiler"):
             self._settings |= compiler.attributes

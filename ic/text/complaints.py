@@ -72,6 +72,7 @@ class Complaints:
     """Diagnostics in the order found, each once."""
 
     def __init__(self, findings: Iterable[Diagnostic] = ()) -> None:
+        """findings: diagnostics of an earlier stage, which belong to no run"""
         self._diagnostics: dict[Diagnostic, None] = dict.fromkeys(findings)
         self._remarks: dict[Diagnostic, None] = {}
         self._provisional: list[Diagnostic] = []
@@ -119,8 +120,8 @@ class Complaints:
         return (bool(self.errors), *sets)
 
     def findings(self) -> DefinitionFindings:
-        """What this collector holds of one definition, to be kept and brought into another check. It must be an `apart`
-        collector."""
+        """All that this collector, which must be an `apart` one, has found of one definition: to be kept, and brought
+        into another check by `take`."""
         return DefinitionFindings(
             tuple(diagnostic for diagnostic in self._diagnostics if diagnostic != _BEFORE),
             tuple(self._remarks),

@@ -156,6 +156,13 @@ class _Conditional:
 
 
 class _Preprocessor(Macros):
+    """One reading of a deck: pcpp's preprocessor with the lexer, macros, conditions, files and messages of MET.
+
+    output        the deck's tokens so far, without white space
+    command_line  the text of the macros of `-D`, where there are some
+    count         tokens that were read, white space included
+    """
+
     def __init__(self, files: Files, findings: Findings, count: int) -> None:
         self.files = files
         self.output: list[Token] = []

@@ -82,6 +82,8 @@ def substituted(macro: Macro, arguments: Sequence[Argument]) -> list[Token]:
 
 
 class _Substitution:
+    """The substitution of one use of a macro, with the arguments of this use."""
+
     def __init__(self, macro: Macro, arguments: Sequence[Argument]) -> None:
         self.macro = macro
         self.arguments = arguments
