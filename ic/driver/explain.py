@@ -7,8 +7,7 @@ from dataclasses import replace
 from os import PathLike
 
 from ic.driver.compile import Compiled, Select, check
-from ic.grammar.spell import spell
-from ic.grammar.syntax import Expression, Name, children, place_of
+from ic.grammar.syntax import Expression, Name, children, place_of, spell
 from ic.meaning.expressions.names import written_origin
 from ic.meaning.expressions.quantity import Value
 from ic.meaning.parameters.owner import Settled

@@ -375,3 +375,72 @@ def spanned(first: Place, last: Place) -> Place:
         return first
     end = last.column + last.length
     return replace(first, length=end - first.column) if end > first.column else first
+
+
+# As text again, for messages and for a plan's quotes of its deck
+
+_BINDING = {
+    "or": 1, "and": 2, "<": 3, "<=": 3, ">": 3, ">=": 3, "==": 3, "!=": 3, "+": 4, "-": 4, "*": 5, "/": 5, "^": 7,
+}  # fmt: skip
+"""The strength with which operators bind in a deck's text: those of a larger number bind first."""
+
+
+def spell(expression: Expression, within: int = 0) -> str:
+    """The expression in a deck's syntax. within: the binding strength of the surrounding operator"""
+    match expression:
+        case Number():
+            if expression.unit is None:
+                return expression.text
+            gap = "" if expression.text.endswith(expression.unit.text) else f" {expression.unit.text}"
+            return expression.text + gap
+        case String():
+            return f'"{expression.value}"'
+        case Name():
+            return expression.text
+        case Indexed():
+            return f"{expression.name.text}[{spell(expression.index)}]"
+        case List():
+            return "[" + ", ".join(spell(item) for item in expression.items) + "]"
+        case WithUnit():
+            inner = spell(expression.inner)
+            closed = isinstance(expression.inner, (List, Call))
+            return f"{inner if closed else f'({inner})'} {expression.unit.text}"
+        case Call():
+            named = (f"{word.text} = {spell(value)}" for word, value in expression.named)
+            inside = ", ".join([*(spell(value) for value in expression.positional), *named])
+            head = expression.name.text + (f"({inside})" if inside or expression.body is None else "")
+            return head if expression.body is None else f"{head} {_spelled_body(expression.body)}"
+        case OverCases():
+            share = f" in {spell(expression.share)} of cases" if expression.share is not None else ""
+            confidence = f" with {spell(expression.confidence)} confidence" if expression.confidence is not None else ""
+            return f"{spell(expression.comparison)}{share}{confidence}"
+        case Broken():
+            return "..."
+        case Range():
+            return f"{spell(expression.first)} .. {spell(expression.last)} by {spell(expression.step)}"
+        case Unary():
+            gap = " " if expression.operator == "not" else ""
+            return f"{expression.operator}{gap}{spell(expression.operand, 6)}"
+        case Binary():
+            binds = _BINDING[expression.operator]
+            text = f"{spell(expression.left, binds)} {expression.operator} {spell(expression.right, binds + 1)}"
+            return f"({text})" if binds < within else text
+    raise AssertionError(expression)
+
+
+def _spelled_body(entries: tuple[Entry, ...]) -> str:
+    """A block's entries with its braces, in one line."""
+    return " ".join(["{", *map(_spelled_entry, entries), "}"])
+
+
+def _spelled_entry(entry: Entry) -> str:
+    """An entry as the text of a deck."""
+    if isinstance(entry, Setting):
+        name = ".".join(word.text for word in entry.path)
+        return " ".join([*(word.text for word in entry.words), name, entry.operator, f"{spell(entry.value)};"])
+    if isinstance(entry, Group):
+        return " ".join([*(word.text for word in entry.words), _spelled_body(entry.body)])
+    if isinstance(entry, Let):
+        return f"{'param' if entry.is_param else 'let'} {entry.name.text} = {spell(entry.value)};"
+    named = [f"{entry.name.text}:"] if entry.name is not None else []
+    return " ".join([*(word.text for word in entry.words), *named, f"{spell(entry.value)};"])

@@ -13,8 +13,7 @@ from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
 import ic
-from ic.grammar.spell import spell
-from ic.grammar.syntax import Call, Entry, Group, Let, Setting, Statement
+from ic.grammar.syntax import Call, Entry, Group, Let, Setting, Statement, spell
 from ic.language import DEFINITIONS
 from ic.meaning.definitions.merge import Item, MergedBlock
 from ic.meaning.definitions.resolve import Definitions

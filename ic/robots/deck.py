@@ -9,8 +9,7 @@ from __future__ import annotations
 import os
 from collections.abc import Collection, Iterator, Mapping, Sequence
 
-from ic.grammar.spell import spell
-from ic.grammar.syntax import Call, Expression, List, Setting, String
+from ic.grammar.syntax import Call, Expression, List, Setting, String, spell
 from ic.robots.attributes import printable
 from ic.robots.entries import LIMITS, ArmEntries, RobotEntry, spelled
 from ic.robots.following import hold_position

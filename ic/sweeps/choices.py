@@ -12,7 +12,6 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
-from ic.grammar.spell import spell
 from ic.grammar.syntax import (
     Call,
     Entry,
@@ -28,6 +27,7 @@ from ic.grammar.syntax import (
     Word,
     place_of,
     spanned,
+    spell,
 )
 from ic.language import BLOCKS, choices
 from ic.meaning.definitions.merge import MergedBlock

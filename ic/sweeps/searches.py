@@ -11,8 +11,7 @@ from collections.abc import Collection, Mapping, Sequence
 
 import numpy as np
 
-from ic.grammar.spell import spell
-from ic.grammar.syntax import Call, List, Name, Setting, Statement, WithUnit, place_of
+from ic.grammar.syntax import Call, List, Name, Setting, Statement, WithUnit, place_of, spell
 from ic.language import BLOCKS
 from ic.language.runs import MARGIN, RUN
 from ic.meaning.definitions.resolve import Definition, Definitions

@@ -6,7 +6,6 @@ import math
 from collections import Counter, defaultdict
 from collections.abc import Iterable, Iterator, Sequence
 
-from ic.grammar.spell import spell
 from ic.grammar.syntax import (
     Binary,
     Call,
@@ -23,6 +22,7 @@ from ic.grammar.syntax import (
     WithUnit,
     children,
     place_of,
+    spell,
 )
 from ic.meaning.definitions.resolve import Definitions
 from ic.meaning.definitions.unused_params import parts

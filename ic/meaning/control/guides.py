@@ -10,8 +10,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from ic.grammar.spell import spell
-from ic.grammar.syntax import place_of
+from ic.grammar.syntax import place_of, spell
 from ic.meaning.control.courses import course_named, use_course
 from ic.meaning.control.schedule import Rate
 from ic.meaning.control.servos import Use, fixed_rate

@@ -6,7 +6,6 @@ import math
 from collections.abc import Callable, Iterable
 from dataclasses import replace
 
-from ic.grammar.spell import spell
 from ic.grammar.syntax import (
     Binary,
     Broken,
@@ -23,6 +22,7 @@ from ic.grammar.syntax import (
     children,
     place_of,
     spanned,
+    spell,
 )
 from ic.meaning.definitions.row_tables import CSV, is_row_table
 from ic.meaning.definitions.row_tables import USAGE as USAGE_OF_TABLES

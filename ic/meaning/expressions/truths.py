@@ -6,8 +6,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from ic.grammar.spell import spell
-from ic.grammar.syntax import Binary, Expression, Name, Unary, place_of
+from ic.grammar.syntax import Binary, Expression, Name, Unary, place_of, spell
 from ic.meaning.expressions.evaluate import COMPARISONS, Lookup, evaluate_number
 from ic.meaning.expressions.quantity import Value, in_words
 from ic.text.complaints import known_words

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from ic.grammar.spell import spell
-from ic.grammar.syntax import Name
+from ic.grammar.syntax import Name, spell
 from ic.meaning.definitions.merge import Item, MergedBlock
 from ic.meaning.parameters.owner import XYZ
 from ic.meaning.parameters.scope import Scope

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ic.grammar.spell import spell
+from ic.grammar.syntax import spell
 from ic.language.bodies import JOINT, LINK
 from ic.meaning.definitions.merge import Item, MergedBlock
 from ic.meaning.definitions.resolve import Definitions

@@ -10,8 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Sequence
 
 from ic.grammar.expressions import EVERY_JOINT
-from ic.grammar.spell import spell
-from ic.grammar.syntax import Binary, Call, Expression, Name, Unary, Word, children, mapped, place_of
+from ic.grammar.syntax import Binary, Call, Expression, Name, Unary, Word, children, mapped, place_of, spell
 from ic.meaning.definitions.merge import Item, MergedBlock
 from ic.meaning.expressions.evaluate import evaluate_number
 from ic.meaning.expressions.quantity import Value, ValueList, in_words

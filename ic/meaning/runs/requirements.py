@@ -7,8 +7,19 @@ from dataclasses import replace
 from types import MappingProxyType
 from typing import Literal
 
-from ic.grammar.spell import spell
-from ic.grammar.syntax import Binary, Call, Expression, Name, OverCases, Statement, Word, children, mapped, place_of
+from ic.grammar.syntax import (
+    Binary,
+    Call,
+    Expression,
+    Name,
+    OverCases,
+    Statement,
+    Word,
+    children,
+    mapped,
+    place_of,
+    spell,
+)
 from ic.meaning.definitions.merge import Item, MergedBlock
 from ic.meaning.parameters.models import word_of
 from ic.meaning.parameters.owner import Owner

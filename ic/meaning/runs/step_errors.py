@@ -5,8 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from ic.grammar.spell import spell
-from ic.grammar.syntax import Binary, Call, Expression, Name, place_of
+from ic.grammar.syntax import Binary, Call, Expression, Name, place_of, spell
 from ic.meaning.definitions.merge import Item, MergedBlock
 from ic.meaning.expressions.quantity import Value
 from ic.meaning.parameters.owner import Owner

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from ic.grammar.spell import spell
-from ic.grammar.syntax import place_of
+from ic.grammar.syntax import place_of, spell
 from ic.meaning.definitions.merge import Item, MergedBlock
 from ic.meaning.parameters.owner import Owner
 from ic.meaning.parameters.scope import Scope

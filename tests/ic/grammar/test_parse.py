@@ -10,7 +10,6 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from ic.grammar.spell import spell
 from ic.grammar.syntax import (
     Binary,
     Call,
@@ -26,6 +25,7 @@ from ic.grammar.syntax import (
     Unit,
     WithUnit,
     Word,
+    spell,
 )
 from ic.read import read
 from met.diagnostic import Place, Problem
