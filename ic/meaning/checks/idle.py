@@ -12,7 +12,6 @@ import numpy as np
 from ic.meaning.control.servos import Use, differ_beyond_rounding, unit_written
 from ic.meaning.definitions.merge import Item, MergedBlock
 from ic.meaning.mechanics.arm import ResolvedArm
-from ic.meaning.parameters.models import value_place
 from ic.meaning.parameters.owner import XYZ, Settled
 from ic.meaning.parameters.scope import Scope
 from met import models
@@ -71,7 +70,7 @@ def remark_idle(scope: Scope, environment: Any, item: Item, values: Mapping[str,
         scope.complaints.remark(
             "D168",
             f"environment `{item.name}` never acts: {idleness[1]}",
-            value_place(written[0]) if written else item.place,
+            written[0].value_place if written else item.place,
             help=leave_out("change that, or leave it out", item.place),
         )
     return idleness is not None
@@ -87,7 +86,7 @@ def remark_kinds(scope: Scope, environment: Any, item: Item, arm: ResolvedArm) -
                 "D168",
                 f"`{parameter.name}` of environment `{item.name}` changes nothing: no "
                 f"joint of arm `{arm.name}` is {parameter.joints}",
-                value_place(written),
+                written.value_place,
                 help=leave_out("leave it out"),
             )
 

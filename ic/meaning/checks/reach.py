@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 
 from ic.meaning.definitions.merge import MergedBlock
-from ic.meaning.parameters.models import value_place
 from ic.meaning.parameters.scope import Scope
 from met import models
 from met.diagnostic import Place
@@ -29,7 +28,7 @@ def check_reach(scope: Scope, block: MergedBlock, structure: Structure) -> None:
         if looked_at is not None:
             item = items[payload.name]
             grapple = item.body.get("grapple") if item.body is not None else None
-            _observe(scope, payload, looked_at, structure.schedule.duration, value_place(grapple or item))
+            _observe(scope, payload, looked_at, structure.schedule.duration, (grapple or item).value_place)
 
 
 def flies_from_afar(experiment: Experiment, name: str) -> bool:

@@ -17,7 +17,6 @@ import numpy as np
 from ic.meaning.control.schedule import Rate, check_stability, hz, slowest_that_fits
 from ic.meaning.control.servos import Use
 from ic.meaning.definitions.merge import MergedBlock
-from ic.meaning.parameters.models import value_place
 from ic.meaning.parameters.owner import XYZ
 from ic.meaning.parameters.scope import Scope
 from ic.text.complaints import known_words
@@ -247,7 +246,7 @@ def _spinning(block: MergedBlock, structure: Structure) -> Iterator[tuple[str, s
     if structure.base is not None and structure.free:
         initial = block.get("initial")
         written = initial.body.get(f"{BASE}.rate") if initial is not None and initial.body is not None else None
-        place = value_place(written) if written is not None else structure.base.place
+        place = written.value_place if written is not None else structure.base.place
         assert place is not None  # a moving base comes from a deck
         yield "the base", f"initial.{BASE}.rate", place
     items = {item.name: item for item in block.of_kind("payload")}
@@ -255,4 +254,4 @@ def _spinning(block: MergedBlock, structure: Structure) -> Iterator[tuple[str, s
         if payload.grappled:
             item = items[payload.name]
             written = item.body.get("rate") if item.body is not None else None
-            yield f"payload `{payload.name}`", f"payloads.{payload.name}.rate", value_place(written or item)
+            yield f"payload `{payload.name}`", f"payloads.{payload.name}.rate", (written or item).value_place

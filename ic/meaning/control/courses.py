@@ -143,7 +143,7 @@ def _column_name(owner: Owner, item: Item | None, joint: str) -> str:
         error(
             "D076",
             f"`column` of {owner.label} is the name of a column, in quotes",
-            place_of(item.value) if item.value is not None else item.place,
+            item.value_place,
             help='write `column = "NAME"`',
         )
     )

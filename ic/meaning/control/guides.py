@@ -17,7 +17,7 @@ from ic.meaning.control.servos import Use, fixed_rate
 from ic.meaning.definitions.merge import Item, MergedBlock
 from ic.meaning.expressions.cycles import components
 from ic.meaning.mechanics.arm import ResolvedArm
-from ic.meaning.parameters.models import find_model, refuse_values, use_model, value_place, word_of
+from ic.meaning.parameters.models import find_model, refuse_values, use_model, word_of
 from ic.meaning.parameters.owner import COMPILED_ALONE, Owner, a_model
 from ic.meaning.parameters.relations import check_names
 from ic.meaning.parameters.scope import Scope
@@ -246,7 +246,7 @@ def _remark_idle(scope: Scope, guide: Any, item: Item, values: Mapping[str, Any]
         scope.complaints.remark(
             "D301",
             f"guide `{item.name}` {idleness[1]}",
-            value_place(written[0] if written else item),
+            (written[0] if written else item).value_place,
             help="change that, or leave it out"
             if not needed
             else f"change {' or '.join(f'`{name}`' for name in idleness[0])}",
@@ -271,7 +271,7 @@ def _of_joints(
             scope.complaints.error(
                 "D071",
                 f"`{wanted.name}` of {owner.label} is one number for each joint, and this is a list",
-                value_place(general),
+                general.value_place,
                 help=f"write `{lines}`" if fits else [f"write `{lines}`", follow],
             )
             scope.checks.fail(owner.join(wanted.name))
@@ -317,7 +317,7 @@ def _courses(
             scope.complaints.error(
                 "D274",
                 f"`{name}` is not guided by {owner.label}",
-                value_place(chosen) if chosen is not None and later else part.place,
+                chosen.value_place if chosen is not None and later else part.place,
                 also=[Label(part.place, "written here")] if later else [],
                 help=[
                     f"it guides {', '.join(guided)}",

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from ic.grammar.syntax import place_of
 from ic.language.unit_words import unit_here
 from ic.meaning.definitions.merge import Item, MergedBlock
 from ic.meaning.parameters.models import find_model, refuse_values, use_model, word_of, words_chosen
@@ -51,16 +50,14 @@ def use_sensor(scope: Scope, servo: Owner, use: ServoUse, item: Item) -> SensorU
             help=[*did_you_mean(item.name, known), known_words("a sensor may be of", known)],
         )
         return None
-    sensor = find_model(
-        scope, "sensor", word_of(item.value), item.place if item.value is None else place_of(item.value)
-    )
+    sensor = find_model(scope, "sensor", word_of(item.value), item.value_place)
     if sensor is None or refuse_values(scope, item.value, [p.name for p in sensor.parameters]):
         return None
     if sensor.measures is not None:
         scope.complaints.error(
             "D281",
             f"`{sensor.name}` is a sensor of a link, and this is a servo",
-            place_of(item.value) if item.value is not None else item.place,
+            item.value_place,
             help=f"write `sensor NAME = {sensor.name} {{ link = LINK; ... }}` in a run",
         )
         return None

@@ -159,7 +159,7 @@ def _use(scope: Scope, item: Item, arm: ResolvedArm) -> Use | None:
         scope.complaints.error(
             "D146",
             f"the servo of joint `{item.name}` is the name of a servo definition",
-            place_of(item.value) if item.value else item.place,
+            item.value_place,
             help=f"write `{item.name} = SERVO;` or `{item.name} = SERVO {{ kp = ...; }}`",
         )
         return None
@@ -412,20 +412,17 @@ def fixed_rate(
 ) -> Rate | None:
     """A rate in Hz, which no sweep can vary; `CONTINUOUS` Hz where it may be `continuous`, and is."""
     if word_of(item.value) == "continuous" and not isinstance(item.value, Call):
-        place = place_of(item.value or Name((), item.place))
         if item.upon is not None:
             scope.complaints.add(no_block(item.name, item.upon, item.place))
             return None
         if continuous:
-            return Rate(label, CONTINUOUS, place)
-        scope.complaints.error(
-            "D106", f"`{name}` cannot be continuous: only the law of a servo can", place, help="write a rate in Hz"
-        )
+            return Rate(label, CONTINUOUS, item.value_place)
+        message = f"`{name}` cannot be continuous: only the law of a servo can"
+        scope.complaints.error("D106", message, item.value_place, help="write a rate in Hz")
         return None
     wanted = replace(RATE, name=name, doc=doc)
     hz = scope.constant(owner, wanted, item)
-    place = place_of(item.value) if item.value is not None else item.place
-    return Rate(label, hz, place) if hz is not None and SLOWEST <= hz <= FASTEST else None
+    return Rate(label, hz, item.value_place) if hz is not None and SLOWEST <= hz <= FASTEST else None
 
 
 def use_command(scope: Scope, owner: Owner, servo: Any, item: Item | None, used: Place) -> Command | None:
@@ -446,7 +443,7 @@ def use_command(scope: Scope, owner: Owner, servo: Any, item: Item | None, used:
             )
         return None
     call = item.value
-    place = place_of(call) if call is not None else item.place
+    place = item.value_place
     if not servo.commands:
         helps = leave_out("leave `command` out")
         scope.complaints.error("D150", f"the model `{servo.name}` takes no command", place, help=helps)

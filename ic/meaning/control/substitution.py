@@ -21,7 +21,6 @@ from ic.meaning.parameters.models import (
     find_model,
     refuse_values,
     use_model,
-    value_place,
     word_of,
 )
 from ic.meaning.parameters.owner import Owner, chosen
@@ -156,7 +155,7 @@ def _substitution(
     if item.name in arm.failed:
         return None
     if item.value is not None or item.detail:
-        place = item.detail[0].place if item.detail else place_of(item.value) if item.value is not None else item.place
+        place = item.detail[0].place if item.detail else item.value_place
         scope.complaints.error("D179", "`substitute` takes the name of one joint, and a block", place, help=USAGE)
         return None
     kind = moving_kind(scope, item, arm, "so it has no motor")
@@ -311,7 +310,7 @@ def _scale(scope: Scope, joint: str, item: Item) -> BedScale | None:
                 _not_its_quotient,
                 code="D365",
                 message=f"`inertia` of {owner.label} is not that of its torque and rate",
-                place=value_place(written),
+                place=written.value_place,
                 path=own,
                 needs=tuple(owner.join(parameter.name) for parameter in bed_scale.PARAMETERS),
                 help="leave it out: with one time for both, inertia is torque over rate",

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import field, replace
 
-from ic.grammar.syntax import Call, Entry, Expression, Group, Let, Name, Setting, Statement, Word
+from ic.grammar.syntax import Call, Entry, Expression, Group, Let, Name, Setting, Statement, Word, place_of
 from ic.text.complaints import Complaints, known_words
 from met.diagnostic import Diagnostic, Label, Place, Problem, did_you_mean, error, leave_out, meant, write
 from met.frozen import frozen
@@ -48,6 +48,11 @@ class Item:
     @property
     def key(self) -> str:
         return f"{self.kind} {self.name}" if self.kind else self.name
+
+    @property
+    def value_place(self) -> Place:
+        """The place of the entry's value; that of the entry itself where it has none."""
+        return self.place if self.value is None else place_of(self.value)
 
 
 @frozen

@@ -22,7 +22,7 @@ from ic.meaning.mechanics.loops import check_followers, close_loops, resolve_loo
 from ic.meaning.mechanics.matter import use_matter
 from ic.meaning.mechanics.meshes import link_meshes
 from ic.meaning.parameters.addresses import in_arm
-from ic.meaning.parameters.models import check_keys, value_place, word_of
+from ic.meaning.parameters.models import check_keys, word_of
 from ic.meaning.parameters.owner import COMPILED_ALONE, Owner
 from ic.meaning.parameters.relations import check_relations, no_direction
 from ic.meaning.parameters.scope import Scope
@@ -453,11 +453,11 @@ def _end(scope: Scope, owner: Owner, key: str, item: Item | None, known: Mapping
         return name
     if name == BASE:
         scope.complaints.error(
-            "D093", "the base cannot be a child", value_place(item), help="turn the joint round: `parent = base;`"
+            "D093", "the base cannot be a child", item.value_place, help="turn the joint round: `parent = base;`"
         )
     elif name is None:
         scope.complaints.error(
-            "D094", f"a link's name is needed for {key}", value_place(item), help=known_words("links", known)
+            "D094", f"a link's name is needed for {key}", item.value_place, help=known_words("links", known)
         )
     else:
         ground = name in scope.definitions.robot_files.roots
@@ -473,7 +473,7 @@ def _end(scope: Scope, owner: Owner, key: str, item: Item | None, known: Mapping
         scope.complaints.error(
             "D094",
             f"no link `{name}` in this arm",
-            value_place(item),
+            item.value_place,
             also=[Label(removal.place, "removed here") for removal in gone],
             help=[*helps, known_words("links", known)],
         )
@@ -519,7 +519,7 @@ def _axis(scope: Scope, owner: Owner, kind: str, item: Item | None) -> None:
         no_direction,
         code="D097",
         message=f"the axis of {owner.label} has no direction",
-        place=value_place(item),
+        place=item.value_place,
         needs=(owner.join("axis"),),
         help="write numbers of ordinary size, not all of them zero",
     )

@@ -12,7 +12,6 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ic.grammar.syntax import place_of
 from ic.meaning.definitions.merge import Item
 from ic.meaning.expressions.conditions import in_pieces
 from ic.meaning.mechanics.loops import all_led_by
@@ -46,7 +45,7 @@ def check_body(
         helps = [f"leave `inertia` out, or write the {kind}'s mass"]
     place, of_file = owner.place, False
     if item is not None:
-        place = item.place if item.value is None else place_of(item.value)
+        place = item.value_place
         of_file = scope.definitions.robot_files.hold(place)
         if of_file:
             entry = f"{name} {{ {'remove inertia;' if weightless else 'inertia = [...] kg*m^2;'} }}"

@@ -142,7 +142,5 @@ def _convention(scope: Scope, item: Item) -> str | None:
     meant = OTHER_NAMES.get(name or "")
     helps = [write(meant, old=name)] if meant else list(did_you_mean(name, CONVENTIONS)) if name else []
     message = f"no Denavit-Hartenberg convention `{name}`" if name else "the name of a convention is needed here"
-    scope.complaints.error(
-        "D180", message, place_of(item.value) if item.value is not None else item.place, help=[*helps, USAGE]
-    )
+    scope.complaints.error("D180", message, item.value_place, help=[*helps, USAGE])
     return None

@@ -12,7 +12,7 @@ import numpy as np
 from ic.grammar.syntax import List, Name
 from ic.language.bodies import BRANCH, LEADER, LOOP, OFFSET, PIN_AT, RATIO, TO_AT
 from ic.meaning.definitions.merge import Item, MergedBlock
-from ic.meaning.parameters.models import check_keys, value_place
+from ic.meaning.parameters.models import check_keys
 from ic.meaning.parameters.owner import COMPILED_ALONE, Owner, Settled
 from ic.meaning.parameters.scope import Scope
 from ic.text.complaints import known_words
@@ -89,7 +89,7 @@ def _named(scope: Scope, owner: Owner, item: Item, kinds: dict[str, str]) -> tup
         helps = ["let it follow joints of one kind, whose ratios have one unit"]
     else:
         return tuple(names)
-    scope.complaints.error("D213", message, value_place(item), help=helps)
+    scope.complaints.error("D213", message, item.value_place, help=helps)
     return None
 
 

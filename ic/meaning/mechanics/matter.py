@@ -12,7 +12,7 @@ from dataclasses import replace
 from ic.language.bodies import COM, INERTIA, MASS
 from ic.meaning.definitions.merge import Item, MergedBlock
 from ic.meaning.mechanics.bodies import check_body
-from ic.meaning.parameters.models import check_keys, refuse_values, value_place, word_of
+from ic.meaning.parameters.models import check_keys, refuse_values, word_of
 from ic.meaning.parameters.owner import Owner, several
 from ic.meaning.parameters.scope import Scope
 from met.diagnostic import did_you_mean
@@ -148,7 +148,7 @@ def _shape(scope: Scope, owner: Owner, item: Item | None) -> Solid | None:
         scope.complaints.error(
             "D088",
             f"no shape `{name}`" if name else "a shape is needed here",
-            value_place(item),
+            item.value_place,
             help=[*helps, f"shapes: {', '.join(shapes)}"],
         )
         scope.checks.fail(f"{owner.path}.shape")

@@ -12,7 +12,7 @@ from ic.language.bodies import ATTITUDE, GRAPPLE, PAYLOAD, PAYLOAD_AT, PAYLOAD_R
 from ic.meaning.definitions.merge import Item, MergedBlock, no_block
 from ic.meaning.mechanics.arm import ResolvedArm
 from ic.meaning.mechanics.matter import use_matter
-from ic.meaning.parameters.models import check_keys, value_place
+from ic.meaning.parameters.models import check_keys
 from ic.meaning.parameters.owner import COMPILED_ALONE, NotSweepable, Owner
 from ic.meaning.parameters.scope import Scope
 from ic.text.complaints import known_words
@@ -53,14 +53,14 @@ def check_payloads(scope: Scope, block: MergedBlock, structure: Structure) -> No
             written = (item.body or MergedBlock()).get(wanted.name)
             settled = scope.parameters.get(f"payloads.{payload.name}.{wanted.name}")
             if written is not None and settled is not None and isinstance(settled.value, float):
-                _remark_time(scope, payload, wanted.name, settled.value, structure, value_place(written))
+                _remark_time(scope, payload, wanted.name, settled.value, structure, written.value_place)
 
 
 def _payload(scope: Scope, item: Item, arm: ResolvedArm, taken: Collection[str]) -> Payload:
     """One payload, its numbers entered as parameters; mistakes are reported."""
     owner = Owner(f"payload `{item.name}`", item.place, f"payloads.{item.name}", homes=item.homes)
     if item.detail or item.value is not None or item.body is None:
-        place = item.detail[0].place if item.detail else value_place(item)
+        place = item.detail[0].place if item.detail else item.value_place
         scope.complaints.error("D260", "`payload` takes a name, and a block", place, help=USAGE)
         scope.checks.fail(owner.path)
         return Payload(item.name, BASE, place=item.place)
@@ -93,7 +93,7 @@ def _payload(scope: Scope, item: Item, arm: ResolvedArm, taken: Collection[str])
             )
     payload = Payload(item.name, link or BASE, grappled, released, item.place, shape)
     if grappled and released:
-        _check_order(scope, item, times, value_place(body.items["release"]))
+        _check_order(scope, item, times, body.items["release"].value_place)
     if payload.flies:
         _check_solid(scope, owner, payload, item)
     scope.keep_setting(owner.join("on"), link or BASE, item=body.get("on"))
@@ -125,7 +125,7 @@ def _link(scope: Scope, owner: Owner, item: Item | None, arm: ResolvedArm) -> st
     scope.complaints.error(
         "D261",
         message,
-        value_place(item),
+        item.value_place,
         help=[*(did_you_mean(name, known) if name else ()), known_words("links", known)],
     )
     return None
@@ -191,7 +191,7 @@ def _check_solid(scope: Scope, owner: Owner, payload: Payload, item: Item) -> No
         tuple(setting.value for setting in settled if setting is not None),  # type: ignore[misc]  # numbers, by the test above
         _not_solid,
         code="D265",
-        place=value_place(cause),
+        place=cause.value_place,
         help=helps,
         needs=(*paths, f"{owner.path}.shape"),
         message=f"payload `{payload.name}` is no body that could fly",

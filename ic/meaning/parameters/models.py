@@ -31,11 +31,6 @@ def word_of(expression: Expression | None) -> str | None:
     return None
 
 
-def value_place(item: Item) -> Place:
-    """The place of an entry's value; that of the entry itself where it has none."""
-    return place_of(item.value) if item.value is not None else item.place
-
-
 def overriding_place(item: Item) -> Place | None:
     """The place of the first entry of a block over an entry's value, of the block where it is empty; None where there
     is none."""
@@ -142,7 +137,7 @@ def find_bare_model(scope: Scope, kind: models.Kind, item: Item, remedy: str) ->
 
     remedy  what to write in place of parameters behind the name, with `{}` for the name
     """
-    name, place = word_of(item.value), place_of(item.value) if item.value is not None else item.place
+    name, place = word_of(item.value), item.value_place
     if name is not None and (isinstance(item.value, Call) or item.body is not None):
         place = place if isinstance(item.value, Call) else overriding_place(item) or place
         scope.complaints.error(
@@ -287,7 +282,7 @@ def named_file(owner: Owner, item: Item) -> String:
             error(
                 "D076",
                 f"`file` of {owner.label} is the name of a file, in quotes",
-                place_of(item.value) if item.value is not None else item.place,
+                item.value_place,
                 help=f'write `file = "{item.value.text if isinstance(item.value, Name) else "NAME.csv"}"`',
             )
         )

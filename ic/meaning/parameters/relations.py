@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ic.grammar.syntax import Name, place_of
+from ic.grammar.syntax import Name
 from ic.meaning.definitions.merge import MergedBlock
 from ic.meaning.parameters.owner import XYZ, Owner
 from ic.meaning.parameters.scope import Scope
@@ -152,6 +152,4 @@ def _count(numbers: tuple[float, ...]) -> str:
 def _place(owner: Owner, body: MergedBlock, name: str) -> Place:
     """The place of a parameter's value, or of its owner where none is written."""
     item = body.get(name)
-    if item is None:
-        return owner.place
-    return place_of(item.value) if item.value is not None else item.place
+    return owner.place if item is None else item.value_place

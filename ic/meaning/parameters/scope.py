@@ -155,8 +155,7 @@ class Scope:
                 self.checks.fail(owner.join(wanted.name))
                 return None
         elif replacements is not None and item is not None:
-            place = place_of(item.value) if item.value is not None else item.place
-            values = [Value(x, PURE, place) for x in replacements]
+            values = [Value(x, PURE, item.value_place) for x in replacements]
         elif wanted.default is None:
             self._missing(owner, wanted)
             return None
@@ -274,7 +273,6 @@ class Scope:
                 return None
             named = item.value.text if isinstance(item.value, Name) else None
             if named is None or (wanted.words and not wanted.names and named not in wanted.words):
-                place = place_of(item.value) if item.value is not None else item.place
                 helps = [
                     *(did_you_mean(named, wanted.words) if named else ()),
                     "one of: " + ", ".join(wanted.words) if wanted.words else "write a name, without quotes",
@@ -284,12 +282,11 @@ class Scope:
                     message += ", without quotes"
                 if named:
                     message = f"`{wanted.name}` of {owner.label} cannot be `{named}`"
-                self.complaints.error("D076", message, place, help=helps)
+                self.complaints.error("D076", message, item.value_place, help=helps)
                 self.checks.fail(path)
                 return None
             word = named
-            place = place_of(item.value) if item.value else item.place
-            origin = written_origin(place, item.overrides)  # a word is not a name for a value
+            origin = written_origin(item.value_place, item.overrides)  # a word is not a name for a value
         table = self.parameters if record else self.auxiliary
         table[path] = Settled(word, "", origin, wanted.doc, item.value if item else None)
         return word
@@ -305,8 +302,7 @@ class Scope:
         """Keep a setting that decides the program, for questions about its origin. item: its entry; None: a default."""
         origin = Origin("default", note=note)
         if item is not None:
-            place = item.place if item.value is None else place_of(item.value)
-            origin = written_origin(place, item.overrides)
+            origin = written_origin(item.value_place, item.overrides)
         self.auxiliary[path] = Settled(value, unit, origin, "", item.value if item is not None else None)
 
     def replace_values(self, values: Mapping[str, Real], item: Item) -> None:
@@ -368,8 +364,8 @@ class Scope:
 
     def keep_derived(self, path: str, value: Real, unit: str, item: Item, note: str) -> None:
         """Keep a parameter that an item computes from its own numbers, which vary in its place."""
-        place = item.place if item.value is None else place_of(item.value)
-        self.parameters[path] = Settled(self._plain(value), unit, Origin("derived", place, item.overrides, note), note)
+        origin = Origin("derived", item.value_place, item.overrides, note)
+        self.parameters[path] = Settled(self._plain(value), unit, origin, note)
 
     def evaluate(self, item: Item, expression: Expression | None = None) -> Value | ValueList:
         """The value of the item's expression, lists with what `+=` appended. Raises Problem."""

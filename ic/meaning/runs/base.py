@@ -108,7 +108,7 @@ def check_base(
         scope.complaints.error(
             "D253",
             f"{what} moves by velocity products, and they are off",
-            place_of(off.value) if off.value is not None else off.place,
+            off.value_place,
             also=[Label(item.place, f"{what}")],
             help=leave_out("leave `velocity_products = off` out"),
         )

@@ -212,7 +212,7 @@ def report_others(scope: Scope, name: str, item: Item, joints: Iterable[Joint], 
         "D380",
         f"`{name} = {COMMAND}` takes the {'position' if name == 'q' else 'rate'} from a command, and joint "
         f"`{first.name}` has no {kinds} command of its own",
-        place_of(item.value) if item.value is not None else item.place,
+        item.value_place,
         also=why,
         help=[
             f"write `{first.name}.{name} = 0 {_UNITS[first.kind][name]};` beside it",

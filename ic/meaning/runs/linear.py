@@ -73,7 +73,7 @@ def _answer(scope: Scope, item: Item, structure: Structure, known: Mapping[str, 
     if instant is not None and time is not None and time > duration:
         message = f"t = {time:.6g} s is not in the run, which ends at {duration:.6g} s"
         helps = "ask at an instant of the run, or let it last longer"
-        scope.complaints.error("D375", message, place_of(instant.value) if instant.value else instant.place, help=helps)
+        scope.complaints.error("D375", message, instant.value_place, help=helps)
     signals: dict[str, tuple[str, ...]] = {}
     lost = False
     for key, field in LISTS.items():
@@ -230,6 +230,4 @@ def _metric(
 
 
 def _place(item: Item, of_item: Item | None) -> Place:
-    if of_item is None:
-        return item.place
-    return of_item.place if of_item.value is None else place_of(of_item.value)
+    return item.place if of_item is None else of_item.value_place

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from ic.grammar.syntax import Name, place_of
 from ic.language.runs import RATES
 from ic.meaning.control.guides import Guiding, check_period
 from ic.meaning.control.schedule import (
@@ -122,7 +121,7 @@ def resolve_schedule(
         base,
         others,
         duration,
-        place_of(item.value or Name((), item.place)) if item is not None else run.place,
+        item.value_place if item is not None else run.place,
         base_written=written,
     )
     ticks = {}

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
-from ic.grammar.syntax import Call, Name, Word, place_of
+from ic.grammar.syntax import Call, Name, Word
 from ic.language.runs import DURATION, ENVIRONMENT, INITIAL, RATES, RUN, SEED, TOLERANCES
 from ic.meaning.control.guides import name_guides, resolve_guides
 from ic.meaning.control.link_sensors import resolve_link_sensors
@@ -270,8 +270,8 @@ def _arm(scope: Scope, run: Owner, item: Item | None) -> ResolvedArm | None:
         return None
     name = scope.definitions.definition_named(item.value) or word_of(item.value)
     if name is None or not isinstance(item.value, Name):
-        place = place_of(item.value) if item.value is not None else item.place
-        scope.complaints.error("D112", "the name of an arm is needed here", place, help="write `arm = ARM;`")
+        message = "the name of an arm is needed here"
+        scope.complaints.error("D112", message, item.value_place, help="write `arm = ARM;`")
         return None
     if item.body is not None:
         scope.complaints.error(
@@ -302,9 +302,7 @@ def _seed(scope: Scope, run: Owner, item: Item | None) -> int:
     if item is None:
         return 0
     if number is not None and not number.is_integer():
-        scope.complaints.error(
-            "D113", "a seed is a whole number from 0 to 2^53", place_of(item.value) if item.value else item.place
-        )
+        scope.complaints.error("D113", "a seed is a whole number from 0 to 2^53", item.value_place)
         return 0
     return int(number or 0)
 
