@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from ic.meaning.checks.carried import Uncarried, uncarried
-from ic.meaning.checks.swings import evaluate_declared
+from ic.meaning.control.schedule import evaluate_declared
 from ic.meaning.parameters.scope import Scope
 from met import models
 from met.content import Content

@@ -8,13 +8,12 @@ step takes (x, x') to M (x, x'), and with r the largest size of M's eigenvalues 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping
-from types import SimpleNamespace
-from typing import Any, TypeVar
+from collections.abc import Iterator, Mapping
+from typing import Any
 
 import numpy as np
 
-from ic.meaning.control.schedule import Rate, check_stability, hz, slowest_that_fits
+from ic.meaning.control.schedule import Rate, check_stability, evaluate_declared, hz, slowest_that_fits
 from ic.meaning.control.servos import Use
 from ic.meaning.definitions.merge import MergedBlock
 from ic.meaning.parameters.owner import XYZ
@@ -26,8 +25,6 @@ from met.integrators.integrator import Motion, Slope
 from met.plan import BASE, Schedule, Structure
 from met.plan.uses import sensor_parts
 from met.trace import Real
-
-T = TypeVar("T")
 
 GROWS = float(np.log(1.1))  # ln of the growth over a run, above which a warning is given: by a tenth
 FINEST = 1000  # times the base rate: beyond, no rate is proposed
@@ -184,22 +181,6 @@ def check_sensor(
     swing = evaluate_declared(scope, sensor.swing, values, path)
     if swing is not None:
         check_swing(scope, f"the filter of {label}", swing, schedule, integrator, dynamics, path, held=False)
-
-
-def evaluate_declared(
-    scope: Scope, function: Callable[..., T] | None, values: Mapping[str, Any], path: str, *more: Any
-) -> T | None:
-    """The result of a declaration's function for these parameters; None without a function, or if one is out of range.
-
-    path  of the parameters
-    """
-    if function is None or scope.checks.failed(path):
-        return None
-    # as in the engine, a division by a product that underflows is infinite, without an exception
-    numbers = {name: np.float64(x) if isinstance(x, float) else x for name, x in values.items()}
-    with scope.complaints.gather(), np.errstate(all="ignore"):
-        return function(SimpleNamespace(**numbers), *more)
-    return None
 
 
 LOST_A_TURN = 0.01

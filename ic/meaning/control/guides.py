@@ -12,8 +12,8 @@ import numpy as np
 
 from ic.grammar.syntax import place_of, spell
 from ic.meaning.control.courses import course_named, use_course
-from ic.meaning.control.schedule import Rate
-from ic.meaning.control.servos import Use, fixed_rate
+from ic.meaning.control.schedule import Rate, Ticker, fixed_rate
+from ic.meaning.control.servos import Use
 from ic.meaning.definitions.merge import Item, MergedBlock
 from ic.meaning.expressions.cycles import components
 from ic.meaning.mechanics.arm import ResolvedArm
@@ -38,43 +38,32 @@ USAGE = "write `guide NAME = MODEL { ... }`"
 
 
 @frozen
-class Guiding:
-    """A guide of the run.
+class Guiding(Ticker):
+    """A guide of the run. Without a rate of its own and without a computer (`ticks`) it has none.
 
-    rate                its own; None: that of the servos, or none where it has no computer (`ticks`)
     link, components    the link that it guides, and in which components, where it has a path
     all_commands_known  whether the command of every joint is known, so that none is missing among `joints`
     fastest             rate constant of its error, 1/s (`Guide.fastest`); None where that is unknown
     """
 
-    name: str
     model: Any
     joints: tuple[str, ...]
     courses: tuple[Course, ...]
-    rate: Rate | None
     link: str
     components: tuple[str, ...]
     all_commands_known: bool
     fastest: Real | None
-    place: Place
 
     kind = KIND
     verb = "ticks"
     code = "D277"
 
     @property
-    def label(self) -> str:
-        return f"guide `{self.name}`"
-
-    @property
-    def path(self) -> str:
-        return f"guides.{self.name}"
-
-    @property
     def ticks(self) -> bool:
         return self.model.steer is not None
 
     def use(self, divisor: int) -> GuideUse:
+        """The guide as a plan has it. divisor: base ticks between its ticks"""
         return GuideUse(self.name, self.model.name, self.joints, divisor, self.courses, self.place)
 
 
@@ -229,7 +218,7 @@ def _guide(scope: Scope, item: Item, arm: ResolvedArm, uses: list[Use], duration
     link = named.get("link", "") if guide.components is not None else ""
     if link not in known["link"]:
         link = ""
-    return Guiding(item.name, guide, joints, courses, rate, link, tuple(guided), whole, fastest, item.place)
+    return Guiding(item.name, rate, item.place, guide, joints, courses, link, tuple(guided), whole, fastest)
 
 
 def _remark_idle(scope: Scope, guide: Any, item: Item, values: Mapping[str, Any], duration: float) -> None:

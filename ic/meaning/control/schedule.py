@@ -7,14 +7,21 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING, Any, Protocol
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import TYPE_CHECKING, Any, ClassVar, TypeVar
 
 import numpy as np
 
+from ic.grammar.syntax import Call
+from ic.meaning.definitions.merge import Item, no_block
+from ic.meaning.parameters.models import word_of
+from ic.meaning.parameters.owner import Owner
 from ic.meaning.parameters.scope import Scope
 from ic.text.complaints import Complaints
 from met.diagnostic import Label, Place
 from met.frozen import frozen
+from met.parameter import Parameter
 from met.plan import Schedule
 from met.trace import Real
 
@@ -22,12 +29,21 @@ if TYPE_CHECKING:
     from fractions import Fraction
 
 
+T = TypeVar("T")
+
 MOST_TICKS = 10**12  # what a plan may have (met/plan_structure): thirty years at a kilohertz
 WARN_ABOVE = 0.5  # of h lambda: above it, a step sees less than the decay it should follow
 
 
 CONTINUOUS = math.inf
 """The `Rate.hz` of a continuous law."""
+
+SLOWEST, FASTEST = 1e-3, 1e9
+"""Smallest and largest rate, Hz."""
+
+RATE = Parameter(
+    name="rate", unit="Hz", at_least=SLOWEST, at_most=FASTEST, ticks=True, doc="how often the servo's computer ticks"
+)
 
 
 @frozen
@@ -48,6 +64,31 @@ class Ticks:
     continuous: bool
 
 
+def fixed_rate(
+    scope: Scope,
+    owner: Owner,
+    item: Item,
+    label: str,
+    name: str = "rate",
+    *,
+    continuous: bool = False,
+    doc: str = RATE.doc,
+) -> Rate | None:
+    """A rate in Hz, which no sweep can vary; `CONTINUOUS` Hz where it may be `continuous`, and is."""
+    if word_of(item.value) == "continuous" and not isinstance(item.value, Call):
+        if item.upon is not None:
+            scope.complaints.add(no_block(item.name, item.upon, item.place))
+            return None
+        if continuous:
+            return Rate(label, CONTINUOUS, item.value_place)
+        message = f"`{name}` cannot be continuous: only the law of a servo can"
+        scope.complaints.error("D106", message, item.value_place, help="write a rate in Hz")
+        return None
+    wanted = replace(RATE, name=name, doc=doc)
+    hz = scope.constant(owner, wanted, item)
+    return Rate(label, hz, item.value_place) if hz is not None and SLOWEST <= hz <= FASTEST else None
+
+
 def exact(value: float) -> Fraction:
     """The simplest fraction that is this number to a part in 1e12: 333.33333333333331 is 1000/3."""
     from fractions import Fraction  # takes 2 ms, and whole rates do without
@@ -57,13 +98,6 @@ def exact(value: float) -> Fraction:
         if simple > 0 and abs(float(simple) - value) <= 1e-12 * value:
             return simple
     return Fraction(value)
-
-
-def base_rate(rates: list[Rate], written: Rate | None) -> Rate:
-    """The base rate: as written, else the fastest of the rates (the first of those)."""
-    if written is not None:
-        return written
-    return max(rates, key=lambda rate: rate.hz)
 
 
 def divisor(complaints: Complaints, rate: Rate, base: Rate, others: list[Rate], *, written: bool) -> int:
@@ -167,21 +201,29 @@ def make_schedule(
 def fastest_rate(
     scope: Scope, servo: Any, parameters: Mapping[str, Any], path: str, *, continuous: bool = False
 ) -> Real | None:
-    """The fastest rate constant of a joint under its servo (`Servo.fastest`); None where the servo does not know it.
+    """The fastest rate constant of a joint under its servo, 1/s (`Servo.fastest`); None where the servo does not know
+    it.
 
     path        of the servo: nothing is computed where a parameter of it is out of its range (already reported)
     continuous  whether its law is, so that its gains count
     """
-    bound = servo.fastest_law if continuous and servo.fastest_law is not None else servo.fastest
-    if bound is None or scope.checks.failed(path):
-        return None
-    from types import SimpleNamespace
+    bound: Callable[..., Real] | None = servo.fastest_law if continuous else None
+    return evaluate_declared(scope, bound or servo.fastest, parameters, path)
 
+
+def evaluate_declared(
+    scope: Scope, function: Callable[..., T] | None, values: Mapping[str, Any], path: str, *more: Any
+) -> T | None:
+    """The result of a declaration's function for these parameters; None without a function, or if one is out of range.
+
+    path  of the parameters
+    """
+    if function is None or scope.checks.failed(path):
+        return None
     # as in the engine, a division by a product that underflows is infinite, without an exception
-    numbers = {name: np.float64(x) if isinstance(x, float) else x for name, x in parameters.items()}
+    numbers = {name: np.float64(x) if isinstance(x, float) else x for name, x in values.items()}
     with scope.complaints.gather(), np.errstate(all="ignore"):
-        fastest: Real = bound(SimpleNamespace(**numbers))
-        return fastest
+        return function(SimpleNamespace(**numbers), *more)
     return None
 
 
@@ -270,43 +312,38 @@ def hz(value: float) -> str:
     return f"{value:.6g}"
 
 
-class Ticking(Protocol):
-    """A guide or a sensor of the run."""
+@frozen
+class Ticker:
+    """A guide or a sensor of the run, which ticks: its name, its own rate (None: that of the servos), and its place.
+
+    kind  its kind in a word: "guide";  verb: for it at its ticks, as messages use it;  code: of a wrong rate
+    """
+
+    name: str
+    rate: Rate | None
+    place: Place
+
+    kind: ClassVar[str]
+    verb: ClassVar[str]
+    code: ClassVar[str]
 
     @property
     def label(self) -> str:
         """Its name in words: "guide `tip`"."""
-
-    @property
-    def kind(self) -> str:
-        """Its kind in a word: "guide"."""
+        return f"{self.kind} `{self.name}`"
 
     @property
     def path(self) -> str:
-        """The path of its parameters."""
-
-    @property
-    def verb(self) -> str:
-        """The verb for a part at its ticks, as messages use it: "ticks" of a guide, "reads" of a sensor."""
-
-    @property
-    def code(self) -> str:
-        """The code of what is wrong with its rate."""
-
-    @property
-    def rate(self) -> Rate | None:
-        """Its rate as the deck has it; None: that of the servos."""
+        """The path of its parameters: "guides.tip"."""
+        return f"{self.kind}s.{self.name}"
 
     @property
     def ticks(self) -> bool:
         """Whether it has a computer."""
-
-    @property
-    def place(self) -> Place:
-        """Where the deck has it."""
+        return True
 
 
-def rate_of(scope: Scope, ticker: Ticking, shared: Rate | None) -> Rate | None:
+def rate_of(scope: Scope, ticker: Ticker, shared: Rate | None) -> Rate | None:
     """The own rate, else that of the servos; None where there is neither (already reported)."""
     own_rate = ticker.rate or shared
     if own_rate is None or own_rate.hz == CONTINUOUS:
@@ -321,14 +358,8 @@ def rate_of(scope: Scope, ticker: Ticking, shared: Rate | None) -> Rate | None:
     return own_rate
 
 
-def check_instants(scope: Scope, ticker: Ticking, divisor: int, dynamics: int, rate: Rate, step: Rate) -> None:
-    """Check that it ticks at instants of the dynamics, since it sees the arm there."""
-    if divisor % dynamics:
-        report_between_steps(scope, ticker, rate, step)
-
-
-def report_between_steps(scope: Scope, ticker: Ticking, rate: Rate, step: Rate) -> None:
-    """Report one whose rate does not divide that of the dynamics."""
+def report_between_steps(scope: Scope, ticker: Ticker, rate: Rate, step: Rate) -> None:
+    """Report a guide or a sensor whose rate does not divide that of the dynamics, at whose instants it sees the arm."""
     scope.complaints.error(
         ticker.code,
         f"{ticker.label} {ticker.verb} at {rate.hz:g} Hz, between the steps of the dynamics",

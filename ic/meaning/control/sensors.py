@@ -1,26 +1,34 @@
-"""Sensors of servos: `sensor QUANTITY = MODEL { ... }` in a servo's definition or use."""
+"""Sensors of servos, `sensor QUANTITY = MODEL { ... }`, and of links, `sensor NAME = MODEL { ... }` in a run."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
+from typing import Any, Final
 
 from ic.language.unit_words import unit_here
+from ic.meaning.control.schedule import Ticker, fixed_rate
 from ic.meaning.definitions.merge import Item, MergedBlock
+from ic.meaning.mechanics.arm import ResolvedArm
 from ic.meaning.parameters.models import find_model, refuse_values, use_model, word_of, words_chosen
-from ic.meaning.parameters.owner import Owner
+from ic.meaning.parameters.owner import Owner, a_model
+from ic.meaning.parameters.relations import check_names
 from ic.meaning.parameters.scope import Scope
 from ic.text.complaints import known_words
 from met import models
 from met.diagnostic import did_you_mean, leave_out
-from met.plan import SensorUse, ServoUse
+from met.frozen import frozen
+from met.plan import LinkSensor, Payload, SensorUse, ServoUse
 from met.plan.uses import quantities
 
+KIND: Final = "sensor"
+USAGE_ON_LINK = "write `sensor NAME = MODEL { link = LINK; ... }`"
 USAGE = "write `sensor QUANTITY = MODEL { ... }`"
 
 
 def without_sensors(block: MergedBlock) -> MergedBlock:
     """A servo's block with its plain entries only."""
-    return replace(block, items={key: item for key, item in block.items.items() if item.kind != "sensor"})
+    return replace(block, items={key: item for key, item in block.items.items() if item.kind != KIND})
 
 
 def use_sensor(scope: Scope, servo: Owner, use: ServoUse, item: Item) -> SensorUse | None:
@@ -50,7 +58,7 @@ def use_sensor(scope: Scope, servo: Owner, use: ServoUse, item: Item) -> SensorU
             help=[*did_you_mean(item.name, known), known_words("a sensor may be of", known)],
         )
         return None
-    sensor = find_model(scope, "sensor", word_of(item.value), item.value_place)
+    sensor = find_model(scope, KIND, word_of(item.value), item.value_place)
     if sensor is None or refuse_values(scope, item.value, [p.name for p in sensor.parameters]):
         return None
     if sensor.measures is not None:
@@ -77,3 +85,82 @@ def use_sensor(scope: Scope, servo: Owner, use: ServoUse, item: Item) -> SensorU
     scope.keep_setting(f"{owner.path}.model", sensor.name, item=item)
     words = [parameter for parameter in sensor.parameters if parameter.shape == "word"]
     return SensorUse(item.name, sensor.name, words_chosen(words, body), item.place)
+
+
+# On links
+
+
+@frozen
+class Sensing(Ticker):
+    """A sensor on a link. values: of its parameters; empty where one is wrong"""
+
+    model: str
+    words: tuple[tuple[str, str], ...]
+    values: Mapping[str, Any]
+
+    kind = KIND
+    verb = "reads"
+    code = "D282"
+
+    def use(self, divisor: int) -> LinkSensor:
+        """The sensor as a plan has it. divisor: base ticks between its readings"""
+        return LinkSensor(self.name, self.model, divisor, self.words, self.place)
+
+
+def resolve_link_sensors(
+    scope: Scope, block: MergedBlock, arm: ResolvedArm, payloads: tuple[Payload, ...]
+) -> list[Sensing]:
+    """Every sensor of the run, in the deck's order; mistakes are reported."""
+    scope.sensors = frozenset(item.name for item in block.of_kind(KIND))
+    sensors = []
+    for item in block.of_kind(KIND):
+        with scope.complaints.gather():
+            sensing = _sensor(scope, item, arm, payloads)
+            if sensing is not None:
+                sensors.append(sensing)
+    return sensors
+
+
+def _sensor(scope: Scope, item: Item, arm: ResolvedArm, payloads: tuple[Payload, ...]) -> Sensing | None:
+    """The sensor of an entry; None where it has a mistake, which is reported."""
+    if item.detail or item.value is None:
+        place = item.detail[0].place if item.detail else item.place
+        message = (
+            f"`{item.detail[0].text}` after the name of a sensor"
+            if item.detail
+            else (f"sensor `{item.name}` has no model")
+        )
+        scope.complaints.error(
+            "D280", message, place, help=[USAGE_ON_LINK, known_words("sensors of links", _of_links())]
+        )
+        return None
+    sensor = find_model(scope, KIND, word_of(item.value), item.value_place)
+    if sensor is None or refuse_values(scope, item.value, [p.name for p in sensor.parameters]):
+        return None
+    if sensor.measures is None:
+        scope.complaints.error(
+            "D281",
+            f"`{sensor.name}` is a sensor of a joint, and this is a run",
+            item.value_place,
+            help=[
+                f"write `sensor QUANTITY = {sensor.name} {{ ... }}` in a servo, such as of `qd`",
+                known_words("sensors of links", _of_links()),
+            ],
+        )
+        return None
+    body = item.body or MergedBlock()
+    owner = Owner(f"sensor `{item.name}`", item.place, f"sensors.{item.name}", homes=item.homes, of=sensor.unit)
+    scope.keep_setting(f"{owner.path}.model", sensor.name, item=item)
+    bodies = [*(link.name for link in arm.links), *(payload.name for payload in payloads)]
+    known = {"joint": [joint.name for joint in arm.moving], "link": bodies}
+    check_names(scope, owner, sensor.parameters, body, arm=arm.name, known=known, failed=arm.failed)
+    values = use_model(scope, owner, sensor.parameters, body, ["rate"])
+    scope.not_sweepable[owner.path] = a_model("a sensor", owner.path)
+    rate_item = body.get("rate")
+    rate = fixed_rate(scope, owner, rate_item, owner.label, doc="how often it reads") if rate_item is not None else None
+    words = [parameter for parameter in sensor.parameters if parameter.shape == "word" and not parameter.names]
+    return Sensing(item.name, rate, item.place, sensor.name, words_chosen(words, body), values or {})
+
+
+def _of_links() -> list[str]:
+    return sorted(name for name, model in models.available(KIND).items() if model.measures is not None)

@@ -11,10 +11,10 @@ import numpy as np
 
 from ic.grammar.syntax import Call, Expression, Name, Number, String, WithUnit, Word, place_of
 from ic.meaning.control.courses import course_named, use_course
-from ic.meaning.control.schedule import CONTINUOUS, Rate
+from ic.meaning.control.schedule import Rate, fixed_rate
 from ic.meaning.control.sensors import use_sensor, without_sensors
 from ic.meaning.control.shared_servos import use_shared, with_other_joints
-from ic.meaning.definitions.merge import Item, MergedBlock, no_block, overlay, refuse_block
+from ic.meaning.definitions.merge import Item, MergedBlock, overlay, refuse_block
 from ic.meaning.expressions.quantity import measure_of
 from ic.meaning.mechanics.arm import ResolvedArm
 from ic.meaning.mechanics.loops import leaders_in_words
@@ -39,14 +39,10 @@ from met.plan.channel import COMMAND_UNIT
 from met.trace import Scalar, where
 from met.unit_parser import parse_unit
 
-SLOWEST, FASTEST = 1e-3, 1e9
 APART, DIGITS = 1e-9, 1e-5
 """Positions are equal within APART (rad or m: far above rounding of a deck's numbers, far below visible differences)
 and a unit of the sixth digit: so many are printed, and a position copied from there counts as equal."""
 
-RATE = Parameter(
-    name="rate", unit="Hz", at_least=SLOWEST, at_most=FASTEST, ticks=True, doc="how often the servo's computer ticks"
-)
 NOT_PARAMETERS = ("model", "command", "rate")
 EXAMPLE_SETPOINTS: Mapping[str, Mapping[str, str]] = MappingProxyType(
     {
@@ -398,31 +394,6 @@ def unit_written(several: Iterable[Settled], wanted: str) -> tuple[str, float]:
         if written is not None and measure_of(written).dimension == dimension:
             return written.text, measure_of(written).scale
     return wanted, 1.0
-
-
-def fixed_rate(
-    scope: Scope,
-    owner: Owner,
-    item: Item,
-    label: str,
-    name: str = "rate",
-    *,
-    continuous: bool = False,
-    doc: str = RATE.doc,
-) -> Rate | None:
-    """A rate in Hz, which no sweep can vary; `CONTINUOUS` Hz where it may be `continuous`, and is."""
-    if word_of(item.value) == "continuous" and not isinstance(item.value, Call):
-        if item.upon is not None:
-            scope.complaints.add(no_block(item.name, item.upon, item.place))
-            return None
-        if continuous:
-            return Rate(label, CONTINUOUS, item.value_place)
-        message = f"`{name}` cannot be continuous: only the law of a servo can"
-        scope.complaints.error("D106", message, item.value_place, help="write a rate in Hz")
-        return None
-    wanted = replace(RATE, name=name, doc=doc)
-    hz = scope.constant(owner, wanted, item)
-    return Rate(label, hz, item.value_place) if hz is not None and SLOWEST <= hz <= FASTEST else None
 
 
 def use_command(scope: Scope, owner: Owner, servo: Any, item: Item | None, used: Place) -> Command | None:

@@ -9,17 +9,16 @@ from ic.meaning.control.guides import Guiding, check_period
 from ic.meaning.control.schedule import (
     CONTINUOUS,
     Rate,
-    Ticking,
+    Ticker,
     Ticks,
-    base_rate,
-    check_instants,
     divisor,
     exact,
+    fixed_rate,
     make_schedule,
     rate_of,
     report_between_steps,
 )
-from ic.meaning.control.servos import Use, fixed_rate
+from ic.meaning.control.servos import Use
 from ic.meaning.definitions.merge import Item, MergedBlock
 from ic.meaning.parameters.models import body_of
 from ic.meaning.parameters.owner import Owner
@@ -84,7 +83,7 @@ def resolve_schedule(
     block: MergedBlock,
     rates: dict[str, Rate],
     uses: list[Use],
-    ticking: Sequence[Ticking],
+    ticking: Sequence[Ticker],
     duration: float | None,
 ) -> tuple[Schedule, dict[str, Ticks], dict[str, int]]:
     """The schedule, the ticks of each servo's law, and the base ticks between ticks of guides and of links' sensors, by
@@ -111,7 +110,8 @@ def resolve_schedule(
     own = [rate for rate in (*(use.rate for use in uses), *(ticker.rate for ticker in ticking)) if rate is not None]
     others = [rate for rate in (shared, *own) if rate is not None and rate.hz != CONTINUOUS]
     record = rates.get("record") or dynamics
-    base = base_rate([dynamics, record, *others], rates.get("base"))
+    everyone = [dynamics, record, *others]
+    base = rates.get("base") or max(everyone, key=lambda rate: rate.hz)  # the first of the fastest
     item = block.get("duration")
     written = "base" in rates
     schedule = make_schedule(
@@ -125,7 +125,6 @@ def resolve_schedule(
         base_written=written,
     )
     ticks = {}
-    everyone = [dynamics, record, *others]
     for use in uses:
         rate = use.rate or (shared if use.has_law else None) or dynamics
         continuous = rate.hz == CONTINUOUS
@@ -158,7 +157,6 @@ def resolve_schedule(
                 report_between_steps(scope, ticker, rate_of_own, dynamics)
                 continue
             own_ticks[ticker.path] = divisor(scope.complaints, rate_of_own, base, everyone, written=written)
-            check_instants(scope, ticker, own_ticks[ticker.path], schedule.dynamics, rate_of_own, dynamics)
             if isinstance(ticker, Guiding):
                 check_period(scope, ticker, rate_of_own)
     if record.hz > dynamics.hz:

@@ -11,8 +11,8 @@ from typing import Any
 from ic.grammar.syntax import Call, Name, Word
 from ic.language.runs import DURATION, ENVIRONMENT, INITIAL, RATES, RUN, SEED, TOLERANCES
 from ic.meaning.control.guides import name_guides, resolve_guides
-from ic.meaning.control.link_sensors import resolve_link_sensors
 from ic.meaning.control.schedule import Rate
+from ic.meaning.control.sensors import resolve_link_sensors
 from ic.meaning.control.servos import resolve_servos
 from ic.meaning.control.substitution import resolve_substitutions
 from ic.meaning.definitions.merge import WITH, Item, MergedBlock, with_meant_names

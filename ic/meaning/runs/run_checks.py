@@ -14,8 +14,8 @@ from ic.meaning.checks.sampling import check_sampling
 from ic.meaning.checks.scales import check_scales
 from ic.meaning.checks.swings import check_circuits, check_sensor, check_spins
 from ic.meaning.control.guides import Guiding, check_guides
-from ic.meaning.control.link_sensors import Sensing
 from ic.meaning.control.schedule import Rate, Ticks, check_stability, fastest_rate
+from ic.meaning.control.sensors import Sensing
 from ic.meaning.control.servos import Use, check_rest, check_start, commands_of
 from ic.meaning.control.substitution import check_brakes, check_runaways, check_ticks
 from ic.meaning.definitions.merge import MergedBlock
