@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import met.run as engine
-from ic.meaning.checks.carried import uncarried
+from ic.meaning.checks.sampling import uncarried
 from met.content import humps_from_zero, humps_of_turns
 from tests.ic.small_decks import ARM, RUN, SERVO, changed, check, codes, experiment, shown
 from tests.oracles.random_deck import random_deck
