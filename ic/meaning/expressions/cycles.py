@@ -139,7 +139,7 @@ def _hertz_for_rad(value: Value, text: str) -> AmbiguousUnit:
     to write for either meaning."""
     unit = _unit(value)
     if unit is not None and "kHz" not in unit.text:
-        number = _in(value, unit)
+        number = _in(value, measure_of(unit))
         helps: tuple[str, ...] = (
             _write("if that is meant", f"{number} {unit.text.replace('Hz', '(rad/s)')}"),
             _write("if cycles a second are meant", f"{number} {unit.text.replace('Hz', '(cycle/s)')}"),
@@ -156,7 +156,7 @@ def _no_angle(value: Value, text: str, power: int) -> AmbiguousUnit:
     """What is unclear about a value without an angle, such as 1/mm, where a unit with rad, rad/m, is wanted, with what
     to write for radians and for turns. power: of the missing rad."""
     unit = _unit(value)
-    number = _number(value) if unit is None else _in(value, unit)
+    number = _in(value, ONE if unit is None else measure_of(unit))
     plain = unit.text if unit is not None else units.text(value.dimension)
 
     def angled(angle: str) -> str:
@@ -197,18 +197,18 @@ def _unit(value: Value) -> Unit | None:
 
 
 def _number(value: Value) -> str:
-    """The number in SI, in a deck's notation."""
-    return "[...]" if isinstance(value.number, Scalar) else units.ONE.decimal(value.number)
+    """The number in SI, in a deck's notation; `[...]` where a sweep varies it."""
+    return _in(value, ONE)
 
 
-def _in(value: Value, unit: Unit) -> str:
-    """The number in its unit."""
-    return "[...]" if isinstance(value.number, Scalar) else measure_of(unit).decimal(value.number)
+def _in(value: Value, measure: Measure) -> str:
+    """The number in this unit, in a deck's notation; `[...]` where a sweep varies it."""
+    return "[...]" if isinstance(value.number, Scalar) else measure.decimal(value.number)
 
 
 def _written(value: Value) -> str:
     """A value as the deck writes it, with its unit."""
     unit = _unit(value)
     if unit is not None:
-        return f"{_in(value, unit)} {unit.text}"
+        return f"{_in(value, measure_of(unit))} {unit.text}"
     return f"{_number(value)} {units.text(value.dimension)}" if not value.hertz else "a number with Hz in its unit"

@@ -30,17 +30,18 @@ from ic.meaning.expressions.quantity import (
     Value,
     ValueList,
     as_float,
+    ceiling,
     in_unit,
     in_words,
     indexed,
     list_arithmetic,
     measure_of,
+    nearest_whole,
     representable,
     signed,
     too_large,
 )
 from ic.meaning.expressions.ranges import range_of, spaced
-from ic.meaning.expressions.whole import ceiling, nearest_whole
 from ic.text.complaints import known_words
 from met import units
 from met.diagnostic import Help, Label, Place, Problem, did_you_mean, error, write
@@ -411,20 +412,15 @@ def _call(call: Call, lookup: Lookup) -> Value | ValueList:
     if name in ("linspace", "logspace"):
         return spaced(call, *arguments)
     first = arguments[0]
+    for other in arguments[1:]:
+        if not units.same(first.dimension, other.dimension):
+            message = f"`{name}` of {in_words(first)} and {in_words(other)}"
+            raise Problem(error("D063", message, other.place, help="both must be of one dimension"))
     if name == "sqrt":
         return _sqrt(call, first)
     if name in ("min", "max"):
         result = first
         for other in arguments[1:]:
-            if not units.same(first.dimension, other.dimension):
-                raise Problem(
-                    error(
-                        "D063",
-                        f"`{name}` of {in_words(first)} and {in_words(other)}",
-                        other.place,
-                        help="both must be of one dimension",
-                    )
-                )
             number = minimum(result.number, other.number) if name == "min" else maximum(result.number, other.number)
             bare = result.bare and other.bare
             result = Value(as_float(number), first.dimension, call.place, bare, first.unit, hertz=first.hertz)
@@ -434,22 +430,17 @@ def _call(call: Call, lookup: Lookup) -> Value | ValueList:
     if name == "sign":
         return Value(as_float(sign(first.number)), PURE, call.place)
     if name == "atan2":
-        other = arguments[1]
-        if not units.same(first.dimension, other.dimension):
-            message = f"`atan2` of {in_words(first)} and {in_words(other)}"
-            raise Problem(error("D063", message, other.place, help="both must be of one dimension"))
-        return Value(as_float(atan2(first.number, other.number)), Dimension(rad=1), call.place)
+        return Value(as_float(atan2(first.number, arguments[1].number)), Dimension(rad=1), call.place)
     if name in _OF_ANGLE:
         if first.dimension not in (PURE, Dimension(rad=1)):
             raise Problem(
                 error("D061", f"`{name}` of {in_words(first)}", first.place, help="an angle is needed, as 30 deg")
             )
         return Value(_number_of(call, _OF_ANGLE[name](first.number)), PURE, call.place)
-    if first.dimension != PURE and name in _TO_WHOLE:
-        helps = f"divide by the step that is meant, and multiply with it: `{name}(x / (1 mm)) * 1 mm`"
-        raise Problem(error("D061", f"`{name}` of {in_words(first)}", first.place, help=helps))
     if first.dimension != PURE:
         helps = "a pure number is needed: divide by a quantity of the same unit"
+        if name in _TO_WHOLE:
+            helps = f"divide by the step that is meant, and multiply with it: `{name}(x / (1 mm)) * 1 mm`"
         raise Problem(error("D061", f"`{name}` of {in_words(first)}", first.place, help=helps))
     if name in _TO_ANGLE:
         return Value(_number_of(call, _TO_ANGLE[name](first.number)), Dimension(rad=1), call.place)

@@ -24,16 +24,6 @@ AXES = {"x": "[1, 0, 0]", "y": "[0, 1, 0]", "z": "[0, 0, 1]"}
 DEEPEST = 64  # depth of lets that need lets: far more than in decks, far less than Python's recursion limit
 
 
-def _uses(place: Place) -> list[Place]:
-    """The places at which the macros of a place were used."""
-    return [macro.use for macro in place.macros]
-
-
-def _macro(place: Place) -> str:
-    """The macro whose body contains a place."""
-    return place.macros[0].macro
-
-
 def _if_a_unit(help: str) -> Help:
     return Help(f"if a unit is meant: {help}", *(help.changes if isinstance(help, Help) else ()))
 
@@ -257,9 +247,9 @@ class Names:
             helps = ["every number of a deck is finite: leave the entry out where its default is endless, or write one"]
         elif not helps and name.place.file == COMMAND_LINE and not name.place.expansions:
             helps = ["`--set` takes a value as the deck would write it: a number with its unit, or a name of the deck"]
-        elif not helps and any(use.file == COMMAND_LINE for use in (name.place, *_uses(name.place))):
+        elif not helps and COMMAND_LINE in (name.place.file, *(macro.use.file for macro in name.place.macros)):
             helps = [
-                f"it comes from `-D`: write a number there, as in `-D {_macro(name.place)}=2`, or define "
+                f"it comes from `-D`: write a number there, as in `-D {name.place.macros[0].macro}=2`, or define "
                 f"`let {first} = ...;` in the deck"
             ]
         elif not helps:

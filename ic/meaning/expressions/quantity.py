@@ -19,7 +19,7 @@ from met import units
 from met.diagnostic import Label, Place, Problem, error
 from met.frozen import frozen
 from met.messages import other_units
-from met.trace import Real, Scalar
+from met.trace import Real, Scalar, absolute, floor, where
 from met.units import PURE, Dimension
 
 
@@ -86,6 +86,19 @@ def as_float(number: Real) -> Real:
     return number if isinstance(number, Scalar) else float(number)
 
 
+def ceiling(x: Real) -> Real:
+    """The least whole number that is not less than x."""
+    return 0.0 - floor(0.0 - x)
+
+
+def nearest_whole(x: Real) -> Real:
+    """The nearest whole number; halves go away from zero."""
+    size = absolute(x)
+    below = floor(size)
+    nearest = where(size - below >= 0.5, below + 1.0, below)
+    return where(x < 0.0, 0.0 - nearest, nearest)
+
+
 def representable(number: Real, place: Place, *factors: Real) -> Real:
     """The number. Raises D067 where it overflows, or is 0 although none of its factors is."""
     if isinstance(number, Scalar):
@@ -137,7 +150,7 @@ def list_arithmetic(
             message = f"`{operator}` of {len(left.items)} numbers and {len(right.items)}"
             helps = "lists are added and subtracted number by number, so both have as many"
             raise Problem(error("D071", message, node.place, also=_labels(left, right), help=helps))
-        pairs = [(a, b) for a, b in zip(_numbers(left), _numbers(right), strict=True)]
+        pairs = zip(_numbers(left), _numbers(right), strict=True)
         return _list_of([of_numbers(node, a, b) for a, b in pairs], place)
     if isinstance(left, ValueList) and isinstance(right, Value) and operator in ("*", "/"):
         unit = left.unit if right.dimension == PURE else None

@@ -12,6 +12,7 @@ import numpy as np
 from ic.grammar.syntax import List, Name
 from ic.language.bodies import BRANCH, LEADER, LOOP, OFFSET, PIN_AT, RATIO, TO_AT
 from ic.meaning.definitions.merge import Item, MergedBlock
+from ic.meaning.expressions.quantity import as_float
 from ic.meaning.parameters.models import check_keys
 from ic.meaning.parameters.owner import COMPILED_ALONE, Owner, Settled
 from ic.meaning.parameters.scope import Scope
@@ -242,8 +243,8 @@ def begin_in_loop(scope: Scope, joint: Joint, joints: Sequence[Joint]) -> None:
         (f"initial.{joint.name}.q", led.q + turns, "joint", note),
         (f"initial.{joint.name}.qd", led.ratio * qd, "joint/s", note),  # type: ignore[operator]
     ):
-        plain = value if isinstance(value, Scalar) else float(value)
-        scope.parameters[path] = Settled(plain, joint_unit(unit, joint), Origin("derived", joint.place, (), why), why)
+        origin = Origin("derived", joint.place, (), why)
+        scope.parameters[path] = Settled(as_float(value), joint_unit(unit, joint), origin, why)
 
 
 def _check(scope: Scope, loop: Loop, corners: Sequence[Corner], q: Real, closed: tuple[Real, ...]) -> None:
