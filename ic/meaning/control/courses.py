@@ -31,13 +31,14 @@ from ic.meaning.parameters.models import (
     use_model,
     word_of,
 )
-from ic.meaning.parameters.owner import OF_A_FILE, Owner
+from ic.meaning.parameters.owner import OF_A_FILE, Owner, a_model
 from ic.meaning.parameters.scope import Scope
 from met import models
 from met.commands.profile import COLUMN, FILE, Profile
 from met.diagnostic import Label, Place, Problem, error
 from met.instants import ROUNDING
 from met.models import parameter
+from met.plan.defaults import component
 
 LISTS = ("times", "values")
 FEWEST = 2  # rows: a curve goes from one to the next
@@ -304,3 +305,21 @@ def course_named(scope: Scope, inner: Expression) -> Expression:
     if isinstance(inner, Name) and inner.text in models.available("command") and not scope.names.is_value(inner):
         return Call(inner, (), (), None, inner.place)
     return inner
+
+
+def use_component(scope: Scope, item: Item, label: str, path: str, doc: str, kind: str) -> str | None:
+    """The command's model that moves one component of a motion in time (of a guide's path, or of a prescribed base),
+    its parameters entered in the scope; None where it has a mistake, which is reported.
+
+    label  of the component, in words;  path: of its parameters;  doc: what its value means;  kind: as `use_course`
+    """
+    assert item.value is not None
+    owner = Owner(
+        label, item.place, path, homes=item.homes, joint=component(item.name).kind, command="position", called=label
+    )
+    inner = course_named(scope, item.value)
+    model = use_course(scope, owner, inner, item, doc=doc, column=item.name, kind=kind, body=item.body)
+    if model is not None:
+        scope.keep_in_deck(f"{path}.model", model, item)
+        scope.not_sweepable[path] = a_model("a course in time", path)
+    return model

@@ -11,7 +11,7 @@ from typing import Any, Final
 import numpy as np
 
 from ic.grammar.syntax import place_of, spell
-from ic.meaning.control.courses import course_named, use_course
+from ic.meaning.control.courses import use_component
 from ic.meaning.control.schedule import Rate, Ticker, fixed_rate
 from ic.meaning.control.servos import Use
 from ic.meaning.definitions.merge import Item, MergedBlock
@@ -324,9 +324,8 @@ def _courses(
 def _course(scope: Scope, owner: Owner, item: Item) -> str | None:
     """The command's model that moves one component of a guide's path in time, its parameters entered in the scope; None
     where it has a mistake, which is reported."""
-    kind = component(item.name).kind
     if item.value is None:
-        unit = "1 m" if kind == "prismatic" else "30 deg"
+        unit = "1 m" if component(item.name).kind == "prismatic" else "30 deg"
         scope.complaints.error(
             "D274",
             f"`{item.name}` of {owner.label} is a value or a course in time",
@@ -335,13 +334,7 @@ def _course(scope: Scope, owner: Owner, item: Item) -> str | None:
         )
         return None
     label, path = f"`{item.name}` of {owner.label}", f"{owner.path}.{item.name}"
-    spot = Owner(label, item.place, path, homes=item.homes, joint=kind, command="position", called=label)
-    inner = course_named(scope, item.value)
-    model = use_course(scope, spot, inner, item, doc=f"{item.name} of the path", column=item.name, body=item.body)
-    if model is not None:
-        scope.keep_in_deck(f"{path}.model", model, item)
-        scope.not_sweepable[path] = a_model("a course in time", path)
-    return model
+    return use_component(scope, item, label, path, f"{item.name} of the path", "joint")
 
 
 def _count(things: tuple[str, ...], what: str) -> str:

@@ -7,16 +7,16 @@ from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
-from ic.grammar.syntax import Call, Expression, place_of
+from ic.grammar.syntax import Call, place_of
 from ic.language import BLOCKS
 from ic.language.runs import BASE_KINDS
-from ic.meaning.control.courses import course_named, use_course
+from ic.meaning.control.courses import use_component
 from ic.meaning.definitions.merge import Item, MergedBlock
 from ic.meaning.mechanics.arm import ResolvedArm, resolve_link
 from ic.meaning.mechanics.bodies import carried_loads
 from ic.meaning.mechanics.meshes import link_meshes
 from ic.meaning.parameters.models import check_keys, refuse_values, word_of
-from ic.meaning.parameters.owner import A_RUN_FOR_EACH, DECIDES, NotSweepable, Owner, Settled, a_model
+from ic.meaning.parameters.owner import A_RUN_FOR_EACH, DECIDES, NotSweepable, Owner, Settled
 from ic.meaning.parameters.scope import Scope
 from ic.text.complaints import known_words
 from met import models
@@ -301,24 +301,9 @@ def _course(scope: Scope, item: Item) -> str | None:
             help=f"write the course alone: `{item.name} = {_example(item.name)};`",
         )
         return None
-    inner: Expression = course_named(scope, item.value)
-    label = f"`{item.name}` of the base"
-    spot = Owner(
-        label,
-        item.place,
-        f"{BASE}.{item.name}",
-        homes=item.homes,
-        joint=component(item.name).kind,
-        command="position",
-        called=label,
-    )
-    model = use_course(
-        scope, spot, inner, item, doc=f"{item.name} of the base", column=item.name, kind="component", body=item.body
-    )
+    label, path = f"`{item.name}` of the base", f"{BASE}.{item.name}"
+    model = use_component(scope, item, label, path, f"{item.name} of the base", "component")
     if model is not None:
-        scope.keep_in_deck(f"{BASE}.{item.name}.model", model, item)
-        path = f"{BASE}.{item.name}"
-        scope.not_sweepable[path] = a_model("a course in time", path)
         _check_jumps(scope, item, model, place_of(item.value))
     return model
 
