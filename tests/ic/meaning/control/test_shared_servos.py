@@ -70,7 +70,7 @@ def test_all_is_as_if_each_joint_had_its_servo_by_itself(monkeypatch: pytest.Mon
         for each in ("auxiliary", "known", "targets", "not_sweepable", "notes", "removed", "joint_kinds"):
             assert repr(getattr(one, each)) == repr(getattr(other, each)), each  # numbers that vary are none to compare
         assert repr(one.parameters) == repr(other.parameters)
-        assert repr(one.names.found.worth) == repr(other.names.found.worth)
+        assert repr(one.names.found_names.worth) == repr(other.names.found_names.worth)
 
 
 @pytest.mark.slow
