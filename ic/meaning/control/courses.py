@@ -28,10 +28,11 @@ from ic.meaning.parameters.models import (
     keep_column,
     named_file,
     refuse_values,
+    use_columns,
     use_model,
     word_of,
 )
-from ic.meaning.parameters.owner import OF_A_FILE, Owner, a_model
+from ic.meaning.parameters.owner import Owner, a_model
 from ic.meaning.parameters.scope import Scope
 from met import models
 from met.commands.profile import COLUMN, FILE, Profile
@@ -60,36 +61,30 @@ def use_file(
 
     name  of the column, unless another is named: that of the joint, or of what `kind` says
     """
-    others = [declared for declared in profile.parameters if declared.name not in LISTS]
     check_keys(scope, body, [declared.name for declared in profile.written], owner)
-    values = use_model(
+    of_file = (FILE.name, COLUMN.name)
+    return use_columns(
         scope,
         owner,
-        others,
-        MergedBlock({key: item for key, item in body.items.items() if key in [other.name for other in others]}),
+        profile.parameters,
+        LISTS,
+        of_file,
+        body,
+        lambda: _columns(scope, owner, profile, body, name, kind),
     )
-    for entry in (FILE.name, COLUMN.name, *LISTS):
-        scope.not_sweepable[owner.join(entry)] = OF_A_FILE
-    columns: dict[str, tuple[float, ...]] | None = None
+
+
+def _columns(
+    scope: Scope, owner: Owner, profile: Profile, body: MergedBlock, own: str, kind: str
+) -> dict[str, tuple[float, ...]] | None:
+    """The lists of times and values of a trajectory, from the columns of its CSV file, in SI; None where it names none
+    (reported). kind, own: the word and the name by which a column is looked for where none is named. Raises Problem."""
     file = body.get(FILE.name)
     if file is None:
         scope.complaints.missing(
             owner.place, (FILE.name,), "D075", f"{owner.label} has no `{FILE.name}`", help='write `file = "NAME.csv"`'
         )
-    else:
-        with scope.complaints.gather():
-            columns = _columns(scope, owner, profile, body, file, name, kind)
-    if columns is None:
-        for entry in LISTS:
-            scope.checks.fail(owner.join(entry))
-    return None if values is None or columns is None else {**values, **columns}
-
-
-def _columns(
-    scope: Scope, owner: Owner, profile: Profile, body: MergedBlock, file: Item, own: str, kind: str
-) -> dict[str, tuple[float, ...]]:
-    """The lists of times and values of a trajectory, from the columns of its CSV file, in SI. kind, own: the word and
-    the name by which a column is looked for where none is named. Raises Problem."""
+        return None
     named = named_file(owner, file)
     wanted, place = _column_name(owner, body.get(COLUMN.name), own), named.place
     if body.get(COLUMN.name) is not None:

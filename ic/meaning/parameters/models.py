@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import replace
 from types import MappingProxyType
 from typing import Any
@@ -240,21 +240,39 @@ def use_table(scope: Scope, owner: Owner, environment: Environment, body: Merged
                 also=[Label(body.items[FILE.name].place, "which is named here")],
                 help=leave_out("leave one of the two out"),
             )
-    own = [parameter.name for parameter in environment.parameters if parameter.shape != "list"]
-    values = use_model(
-        scope,
-        owner,
-        [parameter for parameter in environment.parameters if parameter.shape != "list"],
-        MergedBlock({key: item for key, item in body.items.items() if key in own}),
+    names = [parameter.name for parameter in lists]
+    file = body.items[FILE.name]
+    return use_columns(
+        scope, owner, environment.parameters, names, (FILE.name,), body, lambda: _columns(scope, owner, lists, file)
     )
-    for name in (FILE.name, *(parameter.name for parameter in lists)):
+
+
+def use_columns(
+    scope: Scope,
+    owner: Owner,
+    parameters: Iterable[Parameter],
+    lists: Collection[str],
+    of_file: Iterable[str],
+    body: MergedBlock,
+    read: Callable[[], dict[str, tuple[float, ...]] | None],
+) -> dict[str, Any] | None:
+    """Every parameter of a model of which some are columns of a file, entered in the scope; None where one is missing
+    or wrong.
+
+    lists    the names of those parameters;  of_file: those of the keys that name the file and its columns
+    read     gives the columns, SI, by their parameters; None where they are wrong (already reported). Raises Problem
+    """
+    others = [parameter for parameter in parameters if parameter.name not in lists]
+    own = {parameter.name for parameter in others}
+    values = use_model(scope, owner, others, MergedBlock({key: body.items[key] for key in body.items if key in own}))
+    for name in (*of_file, *lists):
         scope.not_sweepable[owner.join(name)] = OF_A_FILE
     columns: dict[str, tuple[float, ...]] | None = None
     with scope.complaints.gather():
-        columns = _columns(scope, owner, lists, body.items[FILE.name])
+        columns = read()
     if columns is None:
-        for parameter in lists:
-            scope.checks.fail(owner.join(parameter.name))
+        for name in lists:
+            scope.checks.fail(owner.join(name))
     return None if values is None or columns is None else {**values, **columns}
 
 
