@@ -19,7 +19,7 @@ from ic.driver.explain import explanations_of
 from ic.grammar.parse import parse
 from ic.grammar.syntax import Deck, Entry, Name, Number, WithUnit, children
 from ic.grammar.uses import with_full_names
-from ic.meaning.definitions.resolve import Definition, Definitions
+from ic.meaning.definitions.resolve import Definitions
 from ic.meaning.expressions.conditions import Checks
 from ic.meaning.expressions.quantity import measure_of
 from ic.read import read
@@ -214,7 +214,7 @@ def swept_run(
     """A run of a deck and the run itself, or the run of a sweep and the experiments of the sweep. Raises Problem."""
     deck = read(Path(path), [Path(include_dir) for include_dir in include_dirs], tuple(defines))
     sweep = Definitions(deck, Complaints(deck.warnings)).of_kind("sweep").get(name)
-    run = name if sweep is None else _run_of(sweep) or name
+    run = name if sweep is None else sweep.run_name or name
     base_run = given_run(path, run, include_dirs=include_dirs, defines=defines, settings=settings)
     if sweep is None:
         return base_run, (base_run.experiment,)
@@ -253,7 +253,7 @@ def _name_of(definitions: Definitions, run: str | None, deck: Deck) -> str:
             raise Problem(error("E433", message, help=helps), sources)
         return default.name
     if run in sweeps:
-        base = _run_of(sweeps[run])
+        base = sweeps[run].run_name
         message = f"`{run}` is a sweep, and a simulation is of one run, whose values are given"
         raise Problem(
             error("E433", message, sweeps[run].place, help=f'`run="{base}"` is the run that it varies' if base else ()),
@@ -267,10 +267,6 @@ def _name_of(definitions: Definitions, run: str | None, deck: Deck) -> str:
             sources,
         )
     return run
-
-
-def _run_of(sweep: Definition) -> str:
-    return sweep.group.of.text if sweep.group.of is not None else ""
 
 
 def _path(setting: str) -> str:

@@ -188,7 +188,7 @@ class _SweepReader:
         self.repeated: Place | None = None
         self.written: dict[str, Place] = {}
         self.places: dict[str, list[Place]] = {}  # of the numbers of a path
-        self.base = definition.group.of.text if definition.group.of is not None else "RUN"
+        self.base = definition.run_name or "RUN"
         self.paths = {path: place for entry in definition.group.body for path, place in _paths(definitions, entry)}
         self.run_seed = seed
         for entry in definition.group.body:  # first of all: draws need it, wherever it stands

@@ -73,7 +73,7 @@ def command_line_sweep(
     (run,) = requested
     if run.kind != "run":
         message = f"`--vary` varies a run, and `{run.name}` is {with_article(run.kind)}"
-        base = run.group.of.text if run.group.of is not None else None
+        base = run.run_name
         helps = [write(base, f"name the run that it is of: `{base}`", old=run.name)] if base in runs else []
         also = [Label(run.place, "defined here")]
         raise Problem(error("D288", message, place, also=also, help=helps or known_words("name a run", runs)))

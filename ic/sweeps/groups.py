@@ -100,7 +100,7 @@ def experiments_of(source: DeckSource, definition: Definition) -> list[ScopedExp
             return [(built, scope)]
     if definition.parts:
         return _sum(source, definition, ())
-    base = source.definitions.of_kind("run").get(definition.group.of.text if definition.group.of is not None else "")
+    base = source.definitions.of_kind("run").get(definition.run_name)
     allowances = allowances_of(source.definitions, base, source.complaints, definition) if base is not None else ()
     with source.complaints.allowing(places_of(allowances)):  # a macro that the sweep chooses may change them
         return _Sweep(source, definition).groups()

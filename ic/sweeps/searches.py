@@ -101,7 +101,7 @@ def read_search(
         largest=reader.largest,
         parameters=tuple(choice.parameter for choice in chosen),
         at_most=reader.at_most,
-        of=definition.group.of.text if definition.group.of is not None else "",
+        of=definition.run_name,
         seed=reader.seed,
         against=against.name if against is not None else "",
         plants=plants,
@@ -328,9 +328,11 @@ class _SearchReader:
         """Raise Problem D360 for an entry that a search or tuning does not have, with what may have been meant. words:
         before its path."""
         place: Place = entry.place  # type: ignore[attr-defined]  # every entry has one
-        kind, base = self.definition.kind, self.definition.group.of
-        block = BLOCKS[kind]
-        known = [*(declared.name for declared in block.entries), *([] if self.tunes else ["PATH = between(LOW, HIGH)"])]
+        kind, run = self.definition.kind, self.definition.run_name or "RUN"
+        known = [
+            *(declared.name for declared in BLOCKS[kind].entries),
+            *([] if self.tunes else ["PATH = between(LOW, HIGH)"]),
+        ]
         if isinstance(entry, Setting):
             path, value = _path(entry), entry.value
             call = value.inner if isinstance(value, WithUnit) else value
@@ -340,11 +342,10 @@ class _SearchReader:
             if "." not in path and path not in self.definitions.lets and path not in RUN.keys:
                 helps = [*did_you_mean(path, known), known_words(f"a {kind} has", known)]
                 raise Problem(error("D360", f"no `{' '.join([*words, path])}` in a {kind}", place, help=helps))
-            where = f"set it in a run `like {base.text if base is not None else 'RUN'}`"
             raise Problem(
                 error("D360", f"`{' '.join([*words, path])} = ...` in a {kind}", place,
                       help=[f"to choose it write `{f'{CHOOSE} ' * self.tunes}{path} = between(LOW, HIGH) UNIT;`",
-                            f"or {where}"])
+                            f"or set it in a run `like {run}`"])
             )  # fmt: skip
         text = " ".join(words)
         helps = [*did_you_mean(text, known), known_words(f"a {kind} has", known)]
@@ -379,11 +380,11 @@ def _against(
         helps = [*did_you_mean(name.text, known), known_words("sweeps of this deck", known)]
         raise Problem(error("D041", f"no sweep `{name.text}`", place, help=helps))
     definition = known[name.text]
-    run, own = definition.group.of, reader.definition.group.of
+    run, own = definition.run_name, reader.definition.run_name
     also = [Label(definition.place, "written here")]
-    if definition.parts or run is None or own is None or run.text != own.text:
-        origin = "is made of others" if definition.parts or run is None else f"is of `{run.text}`"
-        remedy = f"write a sweep of `{own.text if own is not None else 'RUN'}` with the cases that it must bear"
+    if definition.parts or not own or run != own:
+        origin = "is made of others" if definition.parts or not run else f"is of `{run}`"
+        remedy = f"write a sweep of `{own or 'RUN'}` with the cases that it must bear"
         raise Problem(error("D364", f"sweep `{name.text}` {origin}, and not of the run that is tuned", place, also=also,
                             help=remedy))  # fmt: skip
     before = complaints.error_count

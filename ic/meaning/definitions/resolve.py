@@ -51,6 +51,11 @@ class Definition:
         return self.name.rpartition(".")[0] if self.kind not in EXPERIMENTS else ""
 
     @property
+    def run_name(self) -> str:
+        """The name of the run that a sweep, search or tuning is of; "" of other definitions."""
+        return self.group.of.text if self.group.of is not None else ""
+
+    @property
     def home(self) -> str:
         """The first part of paths that reach its entries; a run with a sweep's choices is called `RUN CHOICES`."""
         return self.name.partition(" ")[0]

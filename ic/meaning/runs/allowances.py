@@ -106,11 +106,7 @@ def warn_of_unneeded(
     names = _with_parts(definitions, checked)
     for definition in (definition for kind in EXPERIMENTS for definition in definitions.of_kind(kind).values()):
         sweep = definition if definition.kind in OF_A_RUN else None
-        run = (
-            definition
-            if sweep is None
-            else runs.get(definition.group.of.text if definition.group.of is not None else "")
-        )
+        run = definition if sweep is None else runs.get(definition.run_name)
         if definition.name not in names and run is not None:
             elsewhere = {allowance.place for allowance in allowances_of(definitions, run, Complaints(), sweep)}
             unneeded = {place: code for place, code in unneeded.items() if place not in elsewhere}
