@@ -131,8 +131,7 @@ class DefinitionChecks:
         for kind in EXPERIMENTS:
             for definition in definitions.of_kind(kind).values():
                 yield definition, partial(self._experiment, definition)
-        blocks = (definitions.block(run) for run in definitions.of_kind("run").values())
-        loaded = any(True for block in blocks if block is not None for _ in block.of_kind("payload"))
+        loaded = definitions.have_payloads()
         for definition in definitions.of_kind("arm").values():
             yield definition, partial(_arm, definition, resolve_arm if loaded else check_arm)
         for definition in definitions.of_kind("servo").values():
@@ -187,8 +186,7 @@ class _Keys:
         }
         names = [(definition.kind, definition.name, definition.default, definition.place) for definition in everything]
         lets = list(definitions.lets.values())
-        blocks = [definitions.block(run) for run in definitions.of_kind("run").values()]
-        loaded = any(True for block in blocks if block is not None for _ in block.of_kind("payload"))
+        loaded = definitions.have_payloads()
         before, *sets = complaints.known_before
         reported = [before, *(sorted(map(repr, group)) for group in sets)]  # type: ignore[call-overload]
         shared = (deck.file, deck.defines, names, lets, reported, loaded, sorted(deck.roofs.items()))

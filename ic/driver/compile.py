@@ -146,8 +146,7 @@ def compile_deck(
         if not varied and len(requested) == 1 and requested[0] is _own_choice(definitions):
             selected = ()  # as where no name is given
         source.effects.report(complaints, [definition.name for definition in requested])
-        blocks = [definitions.block(definition) for definition in definitions.of_kind("run").values()]
-        loaded = any(True for block in blocks if block is not None for _ in block.of_kind("payload"))
+        loaded = definitions.have_payloads()
         for arm in definitions.of_kind("arm").values():  # with a payload its joints may move a mass
             (resolve_arm if loaded else check_arm)(Scope(definitions, complaints), arm)
         used = servos_in_use(definitions)

@@ -509,8 +509,7 @@ def is_guide(scope: Scope, inner: Expression) -> bool:
     deck's servos come without its runs."""
     if isinstance(inner, Name) and inner.roof and len(inner.path) == 1 and not scope.names.is_value(inner):
         return True
-    runs = [scope.definitions.block(run) for run in scope.definitions.of_kind("run").values()]
-    return any(run is not None and run.get(f"guide {word_of(inner)}") is not None for run in runs)
+    return any(run.get(f"guide {word_of(inner)}") is not None for run in scope.definitions.run_blocks())
 
 
 def check_servo_definition(scope: Scope, name: str) -> None:

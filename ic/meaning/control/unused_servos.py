@@ -8,7 +8,6 @@ from ic.grammar.syntax import Call, Entry, Expression, List, Setting
 from ic.language import OF_A_RUN
 from ic.meaning.control.sensors import without_sensors
 from ic.meaning.control.servos import NOT_PARAMETERS, is_guide, use_command
-from ic.meaning.definitions.merge import Item, MergedBlock
 from ic.meaning.definitions.resolve import Definitions
 from ic.meaning.parameters.models import use_model, word_of
 from ic.meaning.parameters.owner import Owner
@@ -24,22 +23,14 @@ KINDS: tuple[JointKind, ...] = ("revolute", "prismatic")
 def servos_in_use(definitions: Definitions) -> frozenset[str]:
     """The servo definitions that a run has, or a sweep chooses, and those that these are like."""
     servos = definitions.of_kind("servo")
-    values = [item.value for block in _runs(definitions) if (own := block.get("servos")) for item in _within(own)]
+    own = [item.body for block in definitions.run_blocks() if (item := block.get("servos")) is not None]
+    values = [item.value for body in own if body is not None for item in body.items.values()]
     for kind in OF_A_RUN:
         for definition in definitions.of_kind(kind).values():
             values += _values(definition.group.body)
     names = (definitions.definition_named(value) or word_of(value) for value in values)
     used = [servos[name] for name in names if name is not None and name in servos]
     return frozenset(home for used_servo in used for home in definitions.homes(used_servo))
-
-
-def _runs(definitions: Definitions) -> Iterator[MergedBlock]:
-    blocks = (definitions.block(run) for run in definitions.of_kind("run").values())
-    return (block for block in blocks if block is not None)
-
-
-def _within(item: Item) -> Iterable[Item]:
-    return item.body.items.values() if item.body is not None else ()
 
 
 def _values(entries: Iterable[Entry]) -> Iterator[Expression]:

@@ -288,6 +288,16 @@ class Definitions:
             above = ancestor
         return block
 
+    def run_blocks(self) -> list[MergedBlock]:
+        """The blocks of all runs, each merged with its bases; without those that failed (already reported)."""
+        blocks = [self.block(run) for run in self._by_kind["run"].values()]
+        return [block for block in blocks if block is not None]
+
+    def have_payloads(self) -> bool:
+        """Return True if a run has a payload: with one, the joints of an arm may move a mass where its links have
+        none."""
+        return any(True for block in self.run_blocks() for _ in block.of_kind("payload"))
+
     def _made_from(self, definition: Definition, call: Call) -> MergedBlock | None:
         """The block made from a definition's file, as its base; None where that failed (already reported)."""
         with self._complaints.gather():

@@ -142,8 +142,7 @@ def check_base(
 def _remark_held(scope: Scope, structure: Structure) -> None:
     """Warn about a base that this file makes a body where nothing weighs, and that is held since no run says `base`."""
     own = next((link for link in structure.links if link.name == BASE), None)
-    runs = [scope.definitions.block(definition) for definition in scope.definitions.of_kind("run").values()]
-    weighs = any(load.model == "gravity" for load in structure.environment)
+    runs, weighs = scope.definitions.run_blocks(), any(load.model == "gravity" for load in structure.environment)
     mass = scope.parameters.get(f"links.{BASE}.mass")
     if (
         own is None
@@ -151,7 +150,7 @@ def _remark_held(scope: Scope, structure: Structure) -> None:
         or own.place is None
         or own.place.included
         or weighs
-        or any(run and run.get(BASE) for run in runs)
+        or any(run.get(BASE) for run in runs)
     ):
         return
     scope.complaints.remark(
