@@ -45,3 +45,8 @@ def unit_here(written: str, joint: JointKind, command: str | None, of: str | Non
     names = {"of"} if of is not None else set()
     simple = measure.scale == 1.0 and not names & set(text.replace("*", " ").replace("/", " ").split())
     return (text if simple else of if text == "of" and of else units.text(measure.dimension)), measure.dimension
+
+
+def after_number(unit: str) -> str:
+    """A unit as it stands after a number, with a space before it; "" of a pure number, whose unit is `1`."""
+    return "" if unit == "1" else f" {unit}"

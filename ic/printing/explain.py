@@ -15,6 +15,7 @@ import numpy as np
 from ic.driver.compile import Compiled
 from ic.driver.explain import explanations_of, with_all_settings
 from ic.language import HEADS
+from ic.language.unit_words import after_number
 from ic.meaning.expressions.names import ON_COMMAND_LINE
 from ic.printing.columns import columns, number, quantity, vector
 from ic.printing.looked_up import is_code
@@ -263,7 +264,7 @@ def _parameter_lines(
     if parameter is not None:
         yield f"  {parameter.doc} ({owner})"
     for coordinate in _varied_by(experiment, name):
-        unit = "" if coordinate.unit == "1" else f" {coordinate.unit}"
+        unit = after_number(coordinate.unit)
         yield f"  varied by {coordinate.path}: {_series_of(coordinate)}{unit}"
     note = _note(origin)
     remark = note if note in (ON_COMMAND_LINE, *NOTES) else ORIGIN_WORDS[origin.kind] + (f": {note}" if note else "")
@@ -316,7 +317,7 @@ def _value_words(experiment: Experiment, parameter: Quantity) -> str:
         case str():
             return parameter.value
         case tuple() if len(parameter.value) > MOST_LISTED:
-            unit = "" if parameter.unit == "1" else f" {parameter.unit}"
+            unit = after_number(parameter.unit)
             return f"{_series(np.array(parameter.value), parameter.unit)}{unit}"
         case tuple():
             return vector(parameter.value, parameter.unit, computed=computed)

@@ -11,6 +11,7 @@ from ic.robots.attributes import printable
 from ic.robots.entries import ArmEntries, spelled
 from ic.robots.robot import MOVING, Joint, Numbers, Robot
 from ic.robots.urdf import MOMENTS
+from ic.text.complaints import counted
 from met.diagnostic import Diagnostic, Label, Place
 
 MOST_NAMED = 8  # names, kinds of elements
@@ -31,7 +32,7 @@ def warnings_of(body: ArmEntries, named: Place) -> Iterator[Diagnostic]:
         )
     doubtful = tuple(in_other_units(body.robot))
     if doubtful:
-        numbers = f"{_count(len(doubtful), 'number')} of `{body.robot.file}`"
+        numbers = f"{counted(len(doubtful), 'number')} of `{body.robot.file}`"
         yield Diagnostic(
             "D218",
             f"{numbers} {'looks' if len(doubtful) == 1 else 'look'} like another unit",
@@ -47,7 +48,7 @@ def warnings_of(body: ArmEntries, named: Place) -> Iterator[Diagnostic]:
             for change in changed[:MOST_NAMED]
         )
         more = f", and {len(changed) - MOST_NAMED} more" if len(changed) > MOST_NAMED else ""
-        what = f"{_count(len(changed), 'name')} of `{body.robot.file}`"
+        what = f"{counted(len(changed), 'name')} of `{body.robot.file}`"
         yield Diagnostic(
             "D211",
             f"{what} {'is' if len(changed) == 1 else 'are'} another in decks{more}",
@@ -83,11 +84,7 @@ def unseen_words(count: int) -> str:
 def _joints(body: ArmEntries, joints: Sequence[Joint]) -> str:
     names = [body.names.joints[joint.name.text] for joint in joints]
     listed = names if len(names) <= MOST_JOINTS else [*names[:2], "...", names[-1]]
-    return f"{_count(len(names), 'joint')} ({', '.join(listed)})"
-
-
-def _count(n: int, what: str) -> str:
-    return f"{n} {what}{'s' * (n != 1)}"
+    return f"{counted(len(names), 'joint')} ({', '.join(listed)})"
 
 
 MOST_TURNS = 2  # of an end of a joint's range: cables allow hardly more

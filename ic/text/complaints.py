@@ -511,6 +511,11 @@ def where_it_belongs(word: str) -> list[str]:
     return [places[word]] if word in places else []
 
 
+def counted(number: int, thing: str) -> str:
+    """A number of things in words: `1 joint`, `2 joints`."""
+    return f"{number} {thing}{'s' * (number != 1)}"
+
+
 def with_article(word: str, *, quoted: bool = False) -> str:
     """A word with its article, `an arm`, `a servo`; quoted: in the quotes of deck text"""
     return f"{'an' if word[:1] in tuple('aeiou') else 'a'} {f'`{word}`' if quoted else word}"

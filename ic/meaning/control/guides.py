@@ -21,7 +21,7 @@ from ic.meaning.parameters.models import find_model, refuse_values, use_model, w
 from ic.meaning.parameters.owner import COMPILED_ALONE, Owner, a_model
 from ic.meaning.parameters.relations import check_names
 from ic.meaning.parameters.scope import Scope
-from ic.text.complaints import known_words
+from ic.text.complaints import counted, known_words
 from met import models, units
 from met.diagnostic import Label, Place, leave_out
 from met.frozen import frozen
@@ -121,8 +121,8 @@ def check_guides(scope: Scope, guides: Iterable[Guiding], structure: Structure) 
             others = words.words if words is not None else ()
             scope.complaints.error(
                 "D275",
-                f"guide `{guide.name}` moves {_count(guide.joints, 'joint')} and guides "
-                f"{_count(guide.components, 'component')}: {', '.join(guide.components)}",
+                f"guide `{guide.name}` moves {counted(len(guide.joints), 'joint')} and guides "
+                f"{counted(len(guide.components), 'component')}: {', '.join(guide.components)}",
                 guide.place,
                 help=[
                     "let more joints follow it, or guide less",
@@ -335,7 +335,3 @@ def _course(scope: Scope, owner: Owner, item: Item) -> str | None:
         return None
     label, path = f"`{item.name}` of {owner.label}", f"{owner.path}.{item.name}"
     return use_component(scope, item, label, path, f"{item.name} of the path", "joint")
-
-
-def _count(things: tuple[str, ...], what: str) -> str:
-    return f"{len(things)} {what}{'s' * (len(things) != 1)}"

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from ic.grammar.syntax import Call, Expression, Name, Number, String, WithUnit, Word, place_of
+from ic.language.unit_words import after_number
 from ic.meaning.control.courses import course_named, use_course
 from ic.meaning.control.schedule import Rate, fixed_rate
 from ic.meaning.control.sensors import use_sensor, without_sensors
@@ -290,7 +291,7 @@ def _check_above(scope: Scope, owner: Owner, parameter: Parameter, command: Comm
     settled = scope.parameters.get(path)
     if settled is None or settled.origin.place is None or isinstance(settled.value, str | tuple):
         return
-    unit = "" if settled.unit == "1" else f" {settled.unit}"
+    unit = after_number(settled.unit)
     limit = f"above {bound:g}{unit}"
 
     def test(values: np.ndarray) -> tuple[np.ndarray, list[str]]:

@@ -25,7 +25,7 @@ from ic.meaning.parameters.models import (
 )
 from ic.meaning.parameters.owner import Owner, chosen
 from ic.meaning.parameters.scope import Scope
-from ic.text.complaints import known_words
+from ic.text.complaints import known_words, with_article
 from met import models
 from met.diagnostic import Label, Place, leave_out
 from met.parameter import Parameter
@@ -253,7 +253,7 @@ def _has_rate(scope: Scope, item: Item, block: MergedBlock, bed: Any, use: Use) 
     place = item.place if named is None or named.value is None else _name_place(named.value)
     sentence = f"`{bed.name}` tells the drive of joint `{item.name}` a rate"
     beds = models.find_own("bed").items()
-    sends = [f"`{name}` sends {_of_kind(model.drive)}" for name, model in beds if model.drive != "rate"]
+    sends = [f"`{name}` sends {with_article(model.drive)}" for name, model in beds if model.drive != "rate"]
     other = f"or another bed: {', '.join(sends)}"
     if use.servo.rate_loop is None or use.servo.rate_wanted is None:
         known = [
@@ -264,16 +264,12 @@ def _has_rate(scope: Scope, item: Item, block: MergedBlock, bed: Any, use: Use) 
         )
         helps = [known_words("servo models that have one", sorted(known)), other]
     elif use.command is not None and use.command.kind not in RATES:
-        message = f"{sentence}, and the joint's command is {_of_kind(use.command.kind)}"
-        helps = [f"command it by {' or '.join(_of_kind(kind) for kind in RATES)}", other]
+        message = f"{sentence}, and the joint's command is {with_article(use.command.kind)}"
+        helps = [f"command it by {' or '.join(with_article(kind) for kind in RATES)}", other]
     else:
         return True
     scope.complaints.error("D368", message, place, also=[Label(use.place, "its servo")], help=helps)
     return False
-
-
-def _of_kind(kind: str) -> str:
-    return f"an {kind}" if kind[0] in "aeiou" else f"a {kind}"
 
 
 def _name_place(value: Expression) -> Place:

@@ -10,10 +10,11 @@ from typing import Any
 import numpy as np
 
 from ic.grammar.syntax import Name
+from ic.language.unit_words import after_number
 from ic.meaning.definitions.merge import MergedBlock
 from ic.meaning.parameters.owner import XYZ, Owner
 from ic.meaning.parameters.scope import Scope
-from ic.text.complaints import known_words
+from ic.text.complaints import counted, known_words
 from met.diagnostic import Label, Place, did_you_mean
 from met.parameter import WORLD, Parameter
 from met.plan import BASE
@@ -113,7 +114,7 @@ def no_direction(parts: np.ndarray) -> tuple[np.ndarray, list[str]]:
 
 def _not_less(unit: str, pairs: np.ndarray) -> tuple[np.ndarray, list[str]]:
     bad = ~(pairs[:, 0] < pairs[:, 1])
-    unit = "" if unit == "1" else f" {unit}"
+    unit = after_number(unit)
     return bad, [f"{low:g}{unit} is not less than {high:g}{unit}" for low, high in pairs[bad][:1]]
 
 
@@ -126,7 +127,7 @@ def _check_list(
         count = len(values[wanted.as_many_as])
         scope.complaints.error(
             "D154",
-            f"{owner.what(wanted)} has {_count(numbers)}, and `{wanted.as_many_as}` {count}",
+            f"{owner.what(wanted)} has {counted(len(numbers), 'number')}, and `{wanted.as_many_as}` {count}",
             place,
             also=[Label(_place(owner, body, wanted.as_many_as), f"`{wanted.as_many_as}`")],
             help="they go together, one to one",
@@ -143,10 +144,6 @@ def _check_list(
                 help=f"sort the points; for a jump, two {wanted.name} close together",
             )
             break
-
-
-def _count(numbers: tuple[float, ...]) -> str:
-    return f"{len(numbers)} number{'s' * (len(numbers) != 1)}"
 
 
 def _place(owner: Owner, body: MergedBlock, name: str) -> Place:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ic.language.unit_words import either, in_degrees, measure_here, unit_here
+from ic.language.unit_words import after_number, either, in_degrees, measure_here, unit_here
 from ic.meaning.definitions.resolve import Definitions
 from ic.meaning.expressions.conditions import Checks
 from ic.meaning.expressions.cycles import ambiguous_unit, unit_remedy
@@ -110,13 +110,12 @@ class ValueChecks:
         text, dimension = owner.unit(wanted)
         expected = f"{short} or {count}" if short else f"{count}"
         if isinstance(listed, Value):
-            unit = "" if text == "1" else f" {text}"
             raise Problem(
                 error(
                     "D071",
                     f"{owner.what(wanted)} is a list of {expected} numbers",
                     listed.place,
-                    help=f"write `{key} = [...]{unit};`",
+                    help=f"write `{key} = [...]{after_number(text)};`",
                 )
             )
         if len(listed.items) not in (short, count):
@@ -174,7 +173,7 @@ class ValueChecks:
         ):
             return
         text = owner.unit(wanted)[0]
-        unit = "" if text == "1" else f" {text}"
+        unit = after_number(text)
 
         def test(values: np.ndarray) -> tuple[np.ndarray, list[str]]:
             """True of each case in which the number is out of its bounds, with words about the first. values: [case,
@@ -290,7 +289,7 @@ class ValueChecks:
         joint = owner.path.partition(".servo")[0]
         key = wanted.name if owner.command is None else "command"
         example = f"{value.number:g}" if value.bare and not isinstance(value.number, Scalar) else "..."
-        example += "" if text == "1" else f" {text}"
+        example += after_number(text)
         written = f"{key} = {example};" if owner.command is None else f"{key} = {owner.command}(...);"
         moves, others = ("slides", "turn") if owner.joint == "prismatic" else ("turns", "slide")
         why = f"joint `{joint}` {moves}, and others of servo `{both[-1]}` {others}"

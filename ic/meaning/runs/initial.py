@@ -33,7 +33,7 @@ from ic.meaning.parameters.owner import Owner
 from ic.meaning.parameters.relations import check_names
 from ic.meaning.parameters.scope import Scope
 from ic.meaning.runs.base import INITIAL_OF_BASE, fixed_to, remark_ground
-from ic.text.complaints import known_words
+from ic.text.complaints import counted, known_words
 from met import models, units
 from met.diagnostic import Label, did_you_mean, leave_out
 from met.parameter import WORLD, Parameter
@@ -265,8 +265,7 @@ def resolve_initial(scope: Scope, body: MergedBlock, arm: ResolvedArm, uses: Seq
             if listed is not None and arm.failed:
                 continue
             if listed is not None and len(listed.items) != len(arm.independent):
-                count, moving = len(listed.items), len(arm.independent)
-                message = f"{count} number{'s' * (count != 1)} for {moving} joint{'s' * (moving != 1)}"
+                message = f"{counted(len(listed.items), 'number')} for {counted(len(arm.independent), 'joint')}"
                 names = ", ".join(joint.name for joint in arm.independent)
                 helps = f"one for each moving joint, in the arm's order, or one for all: {names}"
                 scope.complaints.error("D071", message, listed.place, help=helps)
