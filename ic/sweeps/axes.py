@@ -14,13 +14,14 @@ from dataclasses import replace
 
 import numpy as np
 
+from ic.grammar.settings import path_of
 from ic.grammar.syntax import Call, Expression, Group, Name, Setting, Statement, String, Unit, Word, place_of
 from ic.language.runs import SWEEP
 from ic.meaning.definitions.resolve import Definition, Definitions
 from ic.meaning.expressions.conditions import VariedPath
-from ic.meaning.expressions.evaluate import PURE, evaluate_number
+from ic.meaning.expressions.evaluate import evaluate_number
 from ic.meaning.expressions.names import Names
-from ic.meaning.expressions.quantity import Value, in_words, measure_of, unit_of_plan
+from ic.meaning.expressions.quantity import Value, as_whole, in_words, measure_of, unit_of_plan
 from ic.meaning.runs.allowances import ALLOW
 from ic.sweeps.choices import (
     MACRO,
@@ -39,7 +40,7 @@ from met.frozen import frozen
 from met.plan import Design
 from met.plan.columns import MOST_SWEPT, CaseValues
 from met.plan.searches import Search
-from met.trace import Graph, Scalar
+from met.trace import Graph
 
 MOST_COUNTED = 16  # axes that are read of a sweep that has too many cases
 KNOWN = tuple(entry.name for entry in SWEEP.entries)
@@ -344,10 +345,7 @@ class _SweepReader:
     def column(self, entry: Setting, detail: Sequence[Word] = ()) -> Column:
         """The column of an entry `PATH = VALUES` of a sweep: what it varies, and the values. detail: `macro` where it
         is written. Raises Problem."""
-        path = ".".join(word.text for word in entry.path)
-        place = path_place(entry)
-        if detail:
-            path = f"{MACRO} {path}"
+        path, place = f"{MACRO} {path_of(entry)}" if detail else path_of(entry), path_place(entry)
         self.note(path, place)
         if entry.operator == "+=":
             raise Problem(error("D056", "nothing to append to in a sweep", place, help="write `=`"))
@@ -428,22 +426,13 @@ def _is(entry: Setting, name: str) -> bool:
 def whole_number(definitions: Definitions, expression: Expression, what: str, *, least: int) -> int:
     """A whole number that no sweep varies. Raises Problem D113."""
     value = evaluate_number(expression, Names(definitions, {}).find)
-    number = value.number
-    if (
-        isinstance(number, Scalar)
-        or value.dimension != PURE
-        or not float(number).is_integer()
-        or not least <= number <= 2**53
-    ):
-        most = "2^53" if least == 0 else f"{MOST_SWEPT}"
-        raise Problem(error("D113", f"{what} is a whole number from {least} to {most}", value.place))
-    return int(number)
+    return as_whole(value, what, least, 2**53, "2^53" if least == 0 else f"{MOST_SWEPT}")
 
 
 def _paths(definitions: Definitions, entry: object) -> list[tuple[str, Place]]:
     """Paths that an entry of the sweep varies, with their places."""
     if isinstance(entry, Setting):
-        return [(".".join(word.text for word in entry.path), path_place(entry))]
+        return [(path_of(entry), path_place(entry))]
     if isinstance(entry, Group):
         return [path for inner in entry.body for path in _paths(definitions, inner)]
     if isinstance(entry, Statement) and isinstance(entry.value, Call) and entry.value.body is not None:
@@ -470,7 +459,7 @@ def _refuse(entry: object, words: list[str], base: str) -> None:
             )
         )
     if isinstance(entry, Setting) and not words:
-        path = ".".join(word.text for word in entry.path)
+        path = path_of(entry)
         vary = [] if entry.path[0].text == "tolerances" else [f"`vary {path} = [...];` to vary it"]
         where = f"set it in a run `like {base}`, and sweep that"
         if entry.path[0].text == "links":
@@ -528,14 +517,15 @@ def _refuse(entry: object, words: list[str], base: str) -> None:
     )
 
 
+def distinguished(column: Column) -> list[float] | list[str]:
+    """What tells the values of a column apart: numbers in SI, or the texts of its options."""
+    return column.values.tolist() if isinstance(column, VariedPath) else [option.text for option in column.options]
+
+
 def check_no_equal_cases(columns: Sequence[Column], places: Sequence[Place]) -> None:
     """Report equal rows: equal values are equal cases. places: of the rows, or of the first column's numbers."""
     seen: dict[tuple[float | str, ...], int] = {}
-    keys = [
-        column.values.tolist() if isinstance(column, VariedPath) else [o.text for o in column.options]
-        for column in columns
-    ]
-    for n, row in enumerate(zip(*keys, strict=True)):
+    for n, row in enumerate(zip(*map(distinguished, columns), strict=True)):
         if row in seen:
             if isinstance(columns[0], ChoiceColumn) and not places:
                 places = [option.place for option in columns[0].options]

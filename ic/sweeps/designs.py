@@ -20,11 +20,12 @@ from typing import Any
 
 import numpy as np
 
+from ic.grammar.settings import path_of
 from ic.grammar.syntax import Call, Expression, Name, Setting, Statement, Unit, WithUnit, place_of
 from ic.meaning.definitions.resolve import Definitions
-from ic.meaning.expressions.evaluate import PURE, evaluate_number
+from ic.meaning.expressions.evaluate import evaluate_number
 from ic.meaning.expressions.names import Names
-from ic.meaning.expressions.quantity import Value, measure_of, unit_of_plan
+from ic.meaning.expressions.quantity import Value, as_whole, measure_of, unit_of_plan
 from ic.sweeps.choices import check_constant
 from ic.text.complaints import Complaints, known_words
 from met import units
@@ -35,7 +36,6 @@ from met.plan import Design
 from met.plan.columns import MOST_SWEPT, CaseValues, listed
 from met.plan.drawing import DIGITS, DrawnColumn, drawn_values, within
 from met.statistics.saltelli import FEWEST_PAIRS
-from met.trace import Scalar
 
 UNTIL_SHOWN, AT_MOST = "until_shown", "at_most"
 """Words in place of a number of samples."""
@@ -192,7 +192,7 @@ def read_sample(
         )
     most = MOST_SWEPT if design == "random" else MOST_LISTED
     written = call.positional[0] if until_shown is None else call.named[0][1]
-    count = _count(evaluate_number(written, names.find), most)
+    count = as_whole(evaluate_number(written, names.find), "a number of samples", 1, most, f"{most}")
     parts = []
     before = complaints.error_count
     for entry in call.body:
@@ -262,22 +262,9 @@ def _until_shown(call: Call, definitions: Definitions) -> Place | None:
     return place_of(word)
 
 
-def _count(value: Value, most: int) -> int:
-    """The number of samples of a design. Raises Problem D113 unless it is whole, from 1 to `most`."""
-    number = value.number
-    if (
-        isinstance(number, Scalar)
-        or value.dimension != PURE
-        or not float(number).is_integer()
-        or not 1 <= number <= most
-    ):
-        raise Problem(error("D113", f"a number of samples is a whole number from 1 to {most}", value.place))
-    return int(number)
-
-
 def _part(entry: Setting, names: Names, paths: Mapping[str, Place]) -> DrawnParameter:
     """One line of a `sample`: the parameter with its distribution. Raises Problem D225."""
-    path = ".".join(word.text for word in entry.path)
+    path = path_of(entry)
     unit, call = None, entry.value
     if isinstance(call, WithUnit):
         unit, call = call.unit, call.inner

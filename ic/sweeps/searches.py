@@ -11,6 +11,7 @@ from collections.abc import Collection, Mapping, Sequence
 
 import numpy as np
 
+from ic.grammar.settings import path_of
 from ic.grammar.syntax import Call, List, Name, Setting, Statement, WithUnit, place_of, spell
 from ic.language import BLOCKS
 from ic.language.runs import MARGIN, RUN
@@ -161,7 +162,7 @@ class _SearchReader:
         self.goal_place = self.at_most_place = definition.place
         self.written: dict[str, Place] = {}
         entries = [entry for entry in definition.group.body if isinstance(entry, Setting)]
-        self._paths = {_path(entry): path_place(entry) for entry in entries}
+        self._paths = {path_of(entry): path_place(entry) for entry in entries}
 
     @property
     def usage(self) -> str:
@@ -173,9 +174,9 @@ class _SearchReader:
         value."""
         words = [word.text for word in getattr(entry, "words", ())]
         match entry:
-            case Setting() if not words and _path(entry) in ("at_most", "seed", *(MARGINS * self.tunes)):
-                self._number(entry, _path(entry))
-            case Setting() if not words and _path(entry) == GRADIENTS and self.tunes:
+            case Setting() if not words and path_of(entry) in ("at_most", "seed", *(MARGINS * self.tunes)):
+                self._number(entry, path_of(entry))
+            case Setting() if not words and path_of(entry) == GRADIENTS and self.tunes:
                 self._once(GRADIENTS, path_place(entry))
                 word = word_of(entry.value)
                 if word not in SWITCHED:
@@ -273,7 +274,7 @@ class _SearchReader:
 
     def _choose(self, entry: Setting) -> None:
         """Add a parameter that the search may choose, with its ends. Raises Problem where it is added twice."""
-        path = _path(entry)
+        path = path_of(entry)
         if path in self.written:
             raise Problem(
                 error("D040", f"`{path}` is chosen twice", path_place(entry),
@@ -334,7 +335,7 @@ class _SearchReader:
             *([] if self.tunes else ["PATH = between(LOW, HIGH)"]),
         ]
         if isinstance(entry, Setting):
-            path, value = _path(entry), entry.value
+            path, value = path_of(entry), entry.value
             call = value.inner if isinstance(value, WithUnit) else value
             if isinstance(call, Call) and call.name.text in RANGES:
                 usage = f"{f'{CHOOSE} ' * self.tunes}{path} = {spell(value)};"
@@ -355,10 +356,6 @@ class _SearchReader:
         if words[:1] == ["require"]:
             helps = ["it belongs to the run"]
         raise Problem(error("D360", f"no `{text}` in a {kind}", place, help=helps))
-
-
-def _path(entry: Setting) -> str:
-    return ".".join(word.text for word in entry.path)
 
 
 # Against a sweep

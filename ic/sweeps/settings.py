@@ -15,7 +15,7 @@ which other parameters take their value (`q = 0 rad;` and `with initial.hinge.q 
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator
 from contextlib import suppress
 from dataclasses import replace
 from typing import Literal
@@ -31,7 +31,7 @@ from ic.meaning.expressions.names import Names
 from ic.meaning.expressions.quantity import Value, ValueList
 from ic.meaning.parameters.models import word_of
 from ic.meaning.parameters.scope import VARIES, Scope
-from ic.sweeps.axes import Column, Sweep, SweepAxis
+from ic.sweeps.axes import Column, Sweep, SweepAxis, distinguished
 from ic.sweeps.choices import OF_RUN, ONE_OF_TWO, SENSOR, decides_structure, in_servo, keys_of, nested_entry
 from ic.text.complaints import Complaints
 from met import units
@@ -179,13 +179,9 @@ def _without(axis: SweepAxis, paths: Collection[str]) -> SweepAxis:
     columns = [column for column in axis.columns if column.path not in paths]
     if len(columns) == len(axis.columns) or axis.design not in ("", "saltelli") or not columns:
         return replace(axis, columns=tuple(columns))
-    rows = zip(*(_keys(column) for column in columns), strict=True)
+    rows = zip(*map(distinguished, columns), strict=True)
     first = {row: number for number, row in reversed(list(enumerate(rows)))}
     return replace(axis, columns=tuple(_rows(column, sorted(first.values())) for column in columns))
-
-
-def _keys(column: Column) -> Sequence[object]:
-    return column.values.tolist() if isinstance(column, VariedPath) else [option.text for option in column.options]
 
 
 def _rows(column: Column, rows: list[int]) -> Column:

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import field, replace
 
+from ic.grammar.settings import path_of
 from ic.grammar.syntax import Call, Entry, Expression, Group, Let, Name, Setting, Statement, Word, place_of
 from ic.text.complaints import Complaints, known_words
 from met.diagnostic import Diagnostic, Label, Place, Problem, did_you_mean, error, leave_out, meant, write
@@ -144,7 +145,7 @@ class _Merger:
                 self._state(entry)
             return
         if isinstance(entry, Setting):
-            words, name = entry.words, ".".join(word.text for word in entry.path)
+            words, name = entry.words, path_of(entry)
             if [word.text for word in words] == ["param"]:
                 raise Problem(
                     error(

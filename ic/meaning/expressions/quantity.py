@@ -86,6 +86,20 @@ def as_float(number: Real) -> Real:
     return number if isinstance(number, Scalar) else float(number)
 
 
+def as_whole(value: Value, what: str, least: int, most: int, most_in_words: str) -> int:
+    """A pure number that no sweep varies as a whole number. what: its name in a message. Raises Problem D113 where it
+    is none, or not from `least` to `most`."""
+    number = value.number
+    if (
+        isinstance(number, Scalar)
+        or value.dimension != PURE
+        or not float(number).is_integer()
+        or not least <= number <= most
+    ):
+        raise Problem(error("D113", f"{what} is a whole number from {least} to {most_in_words}", value.place))
+    return int(number)
+
+
 def ceiling(x: Real) -> Real:
     """The least whole number that is not less than x."""
     return 0.0 - floor(0.0 - x)

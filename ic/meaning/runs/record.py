@@ -8,7 +8,7 @@ from ic.grammar.syntax import Binary, Call, Expression, List, Name, Unary, WithU
 from ic.meaning.definitions.merge import Item
 from ic.meaning.parameters.owner import NotSweepable, Owner
 from ic.meaning.parameters.scope import Scope
-from ic.text.complaints import known_words
+from ic.text.complaints import counted, known_words
 from met import models
 from met.diagnostic import Help, Label, Place, did_you_mean, nearest, write
 from met.plan import Recorded, Structure
@@ -211,5 +211,6 @@ def not_one(name: Name, structure: Structure) -> tuple[str, list[str]]:
     if name.text not in known:
         return f"no channel `{name.text}`", nearest_channels(name, known, structure)
     numbers = [f"`{path}`" for variable in known[name.text] for path in variable.channels]
-    count = f"{len(numbers)} channel{'s' * (len(numbers) != 1)}"
-    return f"`{name.text}` is {count}", [known_words("a metric watches one of them", numbers)]
+    return f"`{name.text}` is {counted(len(numbers), 'channel')}", [
+        known_words("a metric watches one of them", numbers)
+    ]
