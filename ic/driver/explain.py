@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from os import PathLike
 
 from ic.driver.compile import Compiled, Select, check
-from ic.grammar.syntax import Expression, Name, children, place_of, spell
+from ic.grammar.syntax import Expression, Name, names_in, place_of, spell
 from ic.meaning.expressions.names import written_origin
 from ic.meaning.expressions.quantity import Value
 from ic.meaning.parameters.owner import Settled
@@ -196,14 +196,3 @@ def _names(scope: Scope, expression: Expression) -> Iterator[Label]:
                     place = place_of(let.value)
                     yield Label(let.name.place if let.set_at is None else place, f"{name.text} = {spell(let.value)}")
         level = below
-
-
-def names_in(expression: Expression) -> Iterable[Name]:
-    """The names that an expression uses."""
-    stack, names = [expression], []
-    while stack:
-        expression = stack.pop()
-        if isinstance(expression, Name):
-            names.append(expression)
-        stack.extend(reversed(children(expression)))
-    return names

@@ -25,7 +25,7 @@ what may stand where is decided when the tree is resolved. So a joint may be cal
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import field, replace
 from types import MappingProxyType
 
@@ -198,6 +198,20 @@ def children(expression: Expression) -> tuple[Expression, ...]:
         case Call(positional=positional, named=named):
             return (*positional, *(value for _, value in named))
     return ()
+
+
+def parts_of(expression: Expression) -> Iterator[Expression]:
+    """The expression and its subexpressions (`children`) of every depth, in the order in which they are written."""
+    waiting = [expression]
+    while waiting:
+        part = waiting.pop()
+        yield part
+        waiting.extend(reversed(children(part)))
+
+
+def names_in(expression: Expression) -> list[Name]:
+    """The names that an expression uses, in the order in which they are written."""
+    return [part for part in parts_of(expression) if isinstance(part, Name)]
 
 
 def mapped(expression: Expression, change: Callable[[Expression], Expression]) -> Expression:

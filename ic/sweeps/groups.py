@@ -10,7 +10,7 @@ from dataclasses import field, replace
 import numpy as np
 
 from ic.grammar.settings import path_of
-from ic.grammar.syntax import Deck, Expression, Name, Word, children
+from ic.grammar.syntax import Deck, Word, names_in
 from ic.meaning.checks.programs import check_program
 from ic.meaning.definitions.resolve import Definition, Definitions
 from ic.meaning.parameters.scope import Scope
@@ -180,7 +180,9 @@ class _Sweep:
         resolved = resolve_run(scope, read.base)
         check_coordinates(scope, complete=resolved is not None)
         lost = varied_paths(read.definitions, self.definition) - set(varied)
-        excludes = [exclude for exclude in sweep.excludes if not names_in(exclude.value) & lost]
+        excludes = [
+            exclude for exclude in sweep.excludes if lost.isdisjoint(name.text for name in names_in(exclude.value))
+        ]
         if resolved is not None and excludes and not self.complaints.is_known_to_lack(read.base.place):
             first = SweptRows(sweep.sizes, tuple(np.zeros(1, np.int64) for _ in sweep.sizes))
             kept_rows(scope, replace(sweep, excludes=tuple(excludes)), first, (), resolved.structure)
@@ -374,17 +376,6 @@ def _seed_of(definitions: Definitions, run: Definition) -> int:
         return whole_number(definitions, item.value, "a seed", least=0) if item is not None and item.value else 0
     except Problem:
         return 0
-
-
-def names_in(expression: Expression) -> set[str]:
-    """The paths that a condition names."""
-    waiting, names = [expression], set()
-    while waiting:
-        part = waiting.pop()
-        waiting += children(part)
-        if isinstance(part, Name):
-            names.add(part.text)
-    return names
 
 
 def _dependents(scope: Scope) -> dict[str, list[str]]:

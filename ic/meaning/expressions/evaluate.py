@@ -20,6 +20,7 @@ from ic.grammar.syntax import (
     Unary,
     WithUnit,
     children,
+    parts_of,
     place_of,
     spanned,
     spell,
@@ -221,13 +222,8 @@ def _with_unit(expression: WithUnit, lookup: Lookup) -> Value | ValueList:
 
 def _written_unit(expression: Expression) -> Place | None:
     """The place of the first unit inside an expression; None where there is none."""
-    stack: list[Expression] = [expression]
-    while stack:
-        part = stack.pop()
-        if isinstance(part, Number | WithUnit) and part.unit is not None:
-            return part.unit.place
-        stack.extend(reversed(children(part)))
-    return None
+    units_inside = (part.unit for part in parts_of(expression) if isinstance(part, Number | WithUnit))
+    return next((unit.place for unit in units_inside if unit is not None), None)
 
 
 def _unary(expression: Unary, lookup: Lookup) -> Value | ValueList:

@@ -7,10 +7,10 @@ sources). Margins of several units are not comparable: then there is only whethe
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 
 from ic.grammar.expressions import EVERY_JOINT
-from ic.grammar.syntax import Binary, Call, Expression, Name, Unary, Word, children, mapped, place_of, spell
+from ic.grammar.syntax import Binary, Call, Expression, Name, Unary, Word, mapped, names_in, place_of, spell
 from ic.meaning.definitions.merge import Item, MergedBlock
 from ic.meaning.expressions.evaluate import evaluate_number
 from ic.meaning.expressions.quantity import Value, ValueList, in_words
@@ -86,7 +86,7 @@ class ChannelTable:
     ) -> None:
         self.scope, self.structure = scope, structure
         self.known = channels(
-            structure, [*(name.text for expression in written for name in _names(expression)), *names]
+            structure, [*(name.text for expression in written for name in names_in(expression)), *names]
         )
         self.lost: set[str] = set()
         self.expressions: list[SignalExpression] = []
@@ -268,7 +268,7 @@ class ChannelTable:
 
     def _joints(self, expression: Expression) -> Sequence[str]:
         """The joints of an expression over every joint: those with all its channels; () for other expressions."""
-        wild = [name for name in _names(expression) if name.path[0].text == EVERY_JOINT]
+        wild = [name for name in names_in(expression) if name.path[0].text == EVERY_JOINT]
         if not wild:
             return ()
         moving = [joint.name for joint in self.structure.moving if joint.name not in self.structure.springs]
@@ -312,14 +312,6 @@ def _joined(left: ConditionMargin, right: ConditionMargin, least: bool, place: P
 def _truth(margin: Real) -> Real:
     """1 where a condition holds, -1 where it does not; not-a-number where its margin is."""
     return where(margin >= 0.0, 1.0, where(margin < 0.0, -1.0, margin))
-
-
-def _names(expression: Expression) -> Iterator[Name]:
-    """The names in an expression, in order."""
-    if isinstance(expression, Name):
-        yield expression
-    for part in children(expression):
-        yield from _names(part)
 
 
 def _of_joint(expression: Expression, joint: str) -> Expression:
