@@ -4,15 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 
 from ic.sweeps.axes import Sweep, SweepAxis
-from ic.sweeps.reach import without_effect
+from ic.sweeps.reach import has_noise
 from ic.text.complaints import Complaints
 from met.diagnostic import Label
-from met.plan import SEED, Experiment
+from met.plan import Experiment
 from met.plan.columns import AxisColumn, blocks
 from met.plan.judged import Requirement
 from met.statistics import confidence, sequential
@@ -84,18 +83,13 @@ def _check_draws(
             also=[Label(sweep.repeated, "repeated")],
             help="leave `repeat` out and draw more cases: `seeds = independent;` gives each noise of its own",
         )
-    elif sweep.independent is None and sweep.repeated is None and _has_noise(experiment):
+    elif sweep.independent is None and sweep.repeated is None and has_noise(experiment):
         complaints.error(
             "D351",
             "all cases feel the same noise, and a confidence needs draws of their own",
             requirement.place,
             help=f"write `seeds = independent;` in the sweep `{sweep.name}`",
         )
-
-
-def _has_noise(experiment: Experiment) -> bool:
-    """Return True if the numbers of a case depend on the seed of its noise."""
-    return SEED not in without_effect(replace(experiment, cases=replace(experiment.cases, seeds="independent")))
 
 
 def _fewest_of_a_point(experiment: Experiment) -> int:

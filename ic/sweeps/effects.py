@@ -21,13 +21,13 @@ from ic.meaning.expressions.quantity import Value
 from ic.meaning.parameters.scope import Scope
 from ic.meaning.runs.run import BLOCKS, Resolved, experiment, resolve_run
 from ic.sweeps.choices import OF_RUN, OF_SERVO
-from ic.sweeps.reach import first_words, no_scale, parameters_nearby, paths_ending_in, without_effect
+from ic.sweeps.reach import first_words, has_noise, no_scale, parameters_nearby, paths_ending_in, without_effect
 from ic.sweeps.settings import SEED as SEED_PATH
 from ic.sweeps.settings import Destination, Settings, applies_to, destination
 from ic.text.complaints import Complaints, known_words
 from met.analysis.memo import AnalysisMemo
 from met.diagnostic import Label, Problem, did_you_mean
-from met.plan import SEED, Cases, Coordinate, Experiment
+from met.plan import Cases, Coordinate, Experiment
 from met.trace import Graph, Scalar
 
 NONSENSE = "?"  # a name that nothing in a deck can have
@@ -61,7 +61,7 @@ class Effects:
         for path, entry in tuple(self.waiting.items()):
             kind = destination(scope.definitions, entry)
             if path == SEED_PATH:
-                used = _has_noise(scope, built)
+                used = any(varied.drawn for varied in scope.varied.values()) or has_noise(built)
             elif kind == "number" and path not in scope.targets:
                 used = False
             elif kind != "run" and not _decides(kind, entry) and _is_number(scope, entry):
@@ -243,13 +243,6 @@ def _is_looked_at(scope: Scope, run: Definition, entry: Setting) -> bool:
     definitions, changed = nonsense.in_run(nonsense.in_definitions(scope.definitions), run)
     trial = Scope(definitions, Complaints(), dict(scope.varied), scope.graph, settings=scope.settings)
     return _resolved(trial, changed) is None
-
-
-def _has_noise(scope: Scope, built: Experiment) -> bool:
-    """Return True if a seed has an effect: there is noise, or a value is drawn."""
-    if any(varied.drawn for varied in scope.varied.values()):
-        return True
-    return SEED not in without_effect(replace(built, cases=replace(built.cases, seeds="independent")))
 
 
 # What a sweep's block names

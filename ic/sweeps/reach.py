@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 from ic.meaning.parameters.scope import Scope
 from ic.sweeps.axes import Sweep
@@ -11,7 +12,7 @@ from ic.text.complaints import Complaints, known_words
 from met import units
 from met.analysis.memo import AnalysisMemo
 from met.diagnostic import Label, leave_out, meant, write
-from met.plan import REPEAT, Coordinate, Experiment
+from met.plan import REPEAT, SEED, Coordinate, Experiment
 from met.plan.columns import CaseValues
 
 
@@ -152,6 +153,11 @@ def without_effect(experiment: Experiment, memo: AnalysisMemo | None = None) -> 
     from met.analysis.audit import idle_inputs
 
     return idle_inputs(experiment, memo)
+
+
+def has_noise(experiment: Experiment) -> bool:
+    """Return True if the numbers of a case depend on the seed of its noise."""
+    return SEED not in without_effect(replace(experiment, cases=replace(experiment.cases, seeds="independent")))
 
 
 def check_effects(complaints: Complaints, sweep: Sweep, experiment: Experiment, memo: AnalysisMemo) -> None:

@@ -35,7 +35,7 @@ from ic.sweeps.axes import Column, Sweep, SweepAxis, distinguished
 from ic.sweeps.choices import OF_RUN, ONE_OF_TWO, SENSOR, decides_structure, in_servo, keys_of, nested_entry
 from ic.text.complaints import Complaints
 from met import units
-from met.diagnostic import Label, Place, Problem, error
+from met.diagnostic import Diagnostic, Label, Place, Problem, error
 from met.frozen import frozen
 from met.trace import Scalar
 
@@ -170,7 +170,7 @@ def _check_alike(
 ) -> None:
     """Report a value of another dimension than the one that it overrides, given at a place."""
     if isinstance(old, Value) and isinstance(new, Value) and not units.same(old.dimension, new.dimension):
-        complaints.add(*_of_another_dimension(name, old, new, place).diagnostics)
+        complaints.add(_of_another_dimension(name, old, new, place))
 
 
 def _without(axis: SweepAxis, paths: Collection[str]) -> SweepAxis:
@@ -225,32 +225,18 @@ def applies_to(definitions: Definitions, run: Definition, entry: Setting) -> boo
     return joints is None or joints.get(f"joint {first}") is not None
 
 
-def _of_another_dimension(path: str, old: Value, new: Value, defined) -> Problem:  # type: ignore[no-untyped-def]
+def _of_another_dimension(path: str, old: Value, new: Value, defined: Place) -> Diagnostic:
     """The error for a setting without a unit (D060), or of another dimension than what it sets (D061)."""
     wanted, also = units.text(old.dimension), [Label(defined, "defined here")]
     if new.bare:
         number = "..." if isinstance(new.number, Scalar) else units.ONE.decimal(new.number)
         unit = old.unit.text if old.unit is not None else wanted
-        return Problem(
-            error(
-                "D060",
-                f"`{path}` is in {wanted}, and this is a bare number",
-                new.place,
-                also=also,
-                help=f"write `{number} {unit}`",
-            )
-        )
+        message = f"`{path}` is in {wanted}, and this is a bare number"
+        return error("D060", message, new.place, also=also, help=f"write `{number} {unit}`")
     is_in = "a pure number" if old.dimension == PURE else f"in {wanted}"
     dimension_words = "a pure number" if new.dimension == PURE else f"in {units.text(new.dimension)}"
-    return Problem(
-        error(
-            "D061",
-            f"`{path}` is {is_in}, and this is {dimension_words}",
-            new.place,
-            also=also,
-            help=unit_remedy(new, wanted, old.dimension),
-        )
-    )
+    message = f"`{path}` is {is_in}, and this is {dimension_words}"
+    return error("D061", message, new.place, also=also, help=unit_remedy(new, wanted, old.dimension))
 
 
 def check_overridden(scope: Scope, run: Definition, made_here: Settings) -> None:
