@@ -21,6 +21,16 @@ def ground(links: Iterable[Link], joints: Iterable[Joint]) -> tuple[str, ...]:
     return tuple(link.name for link in links if link.name in grounded)
 
 
+def way_inward(joints: Iterable[Joint], link: str) -> list[Joint]:
+    """The joints between a link and the base, from the link inwards, fixed ones too."""
+    carriers = {joint.child: joint for joint in joints}
+    way: dict[str, Joint] = {}
+    while link in carriers and carriers[link].name not in way:  # a broken tree is reported elsewhere
+        way[carriers[link].name] = carriers[link]
+        link = carriers[link].parent
+    return list(way.values())
+
+
 def chains(links: Iterable[Link], joints: Iterable[Joint]) -> dict[str, tuple[Joint, ...]]:
     """The joints between the pieces of each boom, from its tip to its root, by the boom's name."""
     carriers = {joint.child: joint for joint in joints}

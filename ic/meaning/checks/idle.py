@@ -20,6 +20,7 @@ from met.diagnostic import Label, Place, leave_out
 from met.environments.environment import Environment
 from met.parameter import WORLD, Parameter
 from met.plan import EnvironmentUse, Joint, Structure
+from met.plan.chains import way_inward
 from met.trace import Real, Scalar
 
 
@@ -252,19 +253,10 @@ def _is_of_torques(channel: str) -> bool:
 def _joints_between(structure: Structure, bodies: list[str]) -> list[str] | None:
     """The moving joints between two bodies, or between one and the ground; None where a free base or a payload is
     involved."""
-    carrying = {joint.child: joint for joint in structure.joints}
-    ways = []
-    for body in [*bodies, WORLD][:2]:
-        if any(payload.name == body for payload in structure.payloads):
-            return None
-        way = []
-        while body in carrying:
-            way.append(carrying[body])
-            body = carrying[body].parent
-        ways.append(way)
-    if structure.free and WORLD in [*bodies, WORLD][:2]:
+    ends = [*bodies, WORLD][:2]
+    if (structure.free and WORLD in ends) or any(payload.name in ends for payload in structure.payloads):
         return None
-    first, second = ways
+    first, second = (way_inward(structure.joints, body) for body in ends)
     apart = [joint for joint in (*first, *second) if (joint in first) != (joint in second)]
     return [joint.name for joint in apart if joint.kind != "fixed"]
 

@@ -14,6 +14,7 @@ from met import models
 from met.diagnostic import Place
 from met.frozen import frozen
 from met.plan import Experiment, Formula, Payload, Structure
+from met.plan.chains import way_inward
 from met.trace import Real
 
 FAR = 1.5
@@ -74,8 +75,8 @@ class GrappleNumbers:
 def grapple_numbers(structure: Structure, payload: Payload, parameters: Mapping[str, Any]) -> GrappleNumbers | None:
     """The numbers to check; None where no statement is possible: the base moves, a joint slides, the payload is pushed,
     or it is not grappled."""
-    joints = _way_to(structure, payload.link)
-    if structure.base is not None or joints is None or not payload.grappled:
+    joints = way_inward(structure.joints, payload.link)
+    if structure.base is not None or any(joint.kind == "prismatic" for joint in joints) or not payload.grappled:
         return None
     if _is_pushed(structure, payload, parameters):
         return None
@@ -88,22 +89,9 @@ def grapple_numbers(structure: Structure, payload: Payload, parameters: Mapping[
         *(f"{head}.{name}" for name in _OF_PAYLOAD),
         f"{link}.com",
         *gravity,
-        *(f"{joint}.at" for joint in joints),
+        *(f"{joint.name}.at" for joint in joints),
     ]
     return GrappleNumbers((*numbers, *(f"{vector}.{x}" for vector in vectors for x in "xyz")), len(gravity))
-
-
-def _way_to(structure: Structure, link: str) -> list[str] | None:
-    """The joints between a link and the base; None where one of them slides, so that the reach is unlimited."""
-    carrying = {joint.child: joint for joint in structure.joints}
-    joints = []
-    while link in carrying:
-        joint = carrying[link]
-        if joint.kind == "prismatic":
-            return None
-        joints.append(joint.name)
-        link = joint.parent
-    return joints
 
 
 def _is_pushed(structure: Structure, payload: Payload, parameters: Mapping[str, Any]) -> bool:

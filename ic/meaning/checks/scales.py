@@ -25,6 +25,7 @@ from ic.meaning.control.servos import Use, unit_written
 from ic.meaning.parameters.scope import Scope
 from met import models
 from met.plan import BASE, Structure
+from met.plan.chains import way_inward
 from met.plan.channel import JOINT_LIMITS
 from met.plan.defaults import INERTIA
 from met.servos.motor import RATIO
@@ -160,10 +161,8 @@ def _pushes(run: RunNumbers) -> Iterator[Scale]:
         point = places.get(link, np.zeros(3)) + turned.get(link, np.eye(3)) @ run.vector(f"{head}.point")
         own = turned.get(link, np.eye(3)) if str(run.settled[f"{head}.axes"].value) == "link" else np.eye(3)
         force, moment = own @ run.vector(f"{head}.force"), own @ run.vector(f"{head}.moment")
-        while (
-            joint := next((candidate for candidate in run.structure.joints if candidate.child == link), None)
-        ) is not None:
-            link, use = joint.parent, motors.get(joint.name)
+        for joint in way_inward(run.structure.joints, link):
+            use = motors.get(joint.name)
             limit, ratio = (run.largest_torque(use), run.of_motor(use, RATIO.name)) if use is not None else (None, None)
             if limit is not None and ratio is not None:
                 axis, through = lines[joint.name]
