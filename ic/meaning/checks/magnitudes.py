@@ -70,9 +70,6 @@ MAGNITUDES = (
 )
 """Kinds of numbers. A limit such as `v_max` is not included: decks write any large number for one that is far away."""
 
-BY_UNIT: dict[str, list[Magnitude]] = {}
-for _kind in MAGNITUDES:
-    BY_UNIT.setdefault(_kind.unit, []).append(_kind)
 
 THIN, DENSE = 1.0, 1e6
 """Smallest and largest density of a shape, kg/m^3: the lightest solids have 1; the densest have 22,600, and decks draw
@@ -135,8 +132,8 @@ def check_magnitudes(scope: Scope, structure: Structure) -> None:
     """Warn about implausible numbers and bodies; about several of one kind once, with the worst."""
     by_kind: dict[Magnitude, list[tuple[str, Settled]]] = {}
     for path, settled in (*scope.parameters.items(), *scope.auxiliary.items()):
-        for kind in BY_UNIT.get(settled.unit, ()):
-            if _may_be_beyond(kind, settled) and kind.pattern.fullmatch(path):
+        for kind in MAGNITUDES:
+            if kind.unit == settled.unit and _may_be_beyond(kind, settled) and kind.pattern.fullmatch(path):
                 by_kind.setdefault(kind, []).append((path, settled))
     for kind, those in by_kind.items():
         _observe(scope, kind, those)

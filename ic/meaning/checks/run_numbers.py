@@ -11,16 +11,13 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from ic.meaning.checks.idle import at_rest
+from ic.meaning.checks.idle import INSTANTS, at_rest
 from ic.meaning.control.servos import Use
 from ic.meaning.parameters.owner import XYZ, Settled
 from met import models
 from met.plan import BASE, Structure
 from met.plan.defaults import INERTIA
 from met.vectors import rotation_about, rotation_rpy
-
-INSTANTS = 1000
-"""Number of instants of a run at which a command is looked at."""
 
 
 class RunNumbers:
@@ -80,8 +77,7 @@ class RunNumbers:
 
     def is_placed(self, joint: str) -> bool:
         """True of a joint whose servo follows a position."""
-        commands = [use.command for use in self.uses if use.joint == joint and use.command is not None]
-        return any(command.kind == "position" for command in commands)
+        return any(use.joint == joint and use.command_kind == "position" for use in self.uses)
 
     def length(self, path: str) -> float:
         """The length of a vector; 0 where there is none."""
@@ -272,7 +268,7 @@ class RunNumbers:
         """Positions and rates that a command asks for at the run's instants, two arrays; those of a commanded rate
         begin at the joint's initial position. Under a command of another kind positions are not-a-number, and its
         values stand for the rates. None where the command's values in time are not known."""
-        course, kind = self.course(use), use.command.kind if use.command is not None else ""
+        course, kind = self.course(use), use.command_kind
         if course is None or kind == "position":
             return course
         values, places = course[0], np.full_like(self.instants, math.nan)

@@ -197,7 +197,7 @@ def _speeds(run: RunNumbers) -> Iterator[Scale]:
         course = run.course(use)
         if ratio is None or kt is None or limit is None or course is None or not limit[1] * kt * ratio > 0.0:
             continue
-        rates = {"rate": course[0], "position": course[1]}.get(use.command.kind if use.command is not None else "")
+        rates = {"rate": course[0], "position": course[1]}.get(use.command_kind)
         if rates is not None:
             unit = "rad/s" if run.kinds[use.joint] == "revolute" else "m/s"
             most = limit[1] / (kt * ratio)
@@ -211,7 +211,7 @@ def _limits(run: RunNumbers) -> Iterator[Scale]:
     usual = "a limit of a joint holds nothing, and is only watched"
     t = run.instants
     for use in run.uses:
-        motion, kind = run.motion(use), use.command.kind if use.command is not None else ""
+        motion, kind = run.motion(use), use.command_kind
         if motion is None:
             continue
         places, rates = motion
@@ -322,7 +322,7 @@ def _plays(run: RunNumbers) -> Iterator[Scale]:
     usual = "within its play a gear drives nothing"
     for use in run.uses:
         path, course = f"{use.joint}.servo.backlash", run.course(use)
-        if path in run.numbers and course is not None and use.command is not None and use.command.kind == "position":
+        if path in run.numbers and course is not None and use.command_kind == "position":
             play, span = run.numbers[path], float(np.ptp(course[0]))
             if span > 0.0:
                 other = f"the motion that is commanded, {span:.4g} rad"
@@ -334,10 +334,9 @@ def _sensors(run: RunNumbers) -> Iterator[Scale]:
     usual = "a servo follows no motion that is less than what it sees"
     for use in run.uses:
         course = run.course(use)
-        if course is None or use.command is None or use.command.kind not in ("position", "rate"):
+        if course is None or use.command_kind not in ("position", "rate"):
             continue
-        values, slopes = course
-        places = use.command.kind == "position"
+        (values, slopes), places = course, use.command_kind == "position"
         motions = {
             "q": float(np.ptp(values)) if places else 0.0,
             "qd": float(np.abs(slopes if places else values).max()),

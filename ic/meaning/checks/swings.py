@@ -140,8 +140,7 @@ def check_circuits(
     """
     path, servo = f"{use.joint}.servo", use.servo
     if servo.swings is not None and not on_bed and use.parameters is not None:
-        kind = use.command.kind if use.command is not None else "none"
-        swings = evaluate_declared(scope, servo.swings, use.parameters, path, kind)
+        swings = evaluate_declared(scope, servo.swings, use.parameters, path, use.command_kind or "none")
         for what, swing in (swings or {}).items():
             label = f"the {what} of servo `{use.definition}`"
             check_swing(scope, label, swing, schedule, integrator, dynamics, path, held=True)

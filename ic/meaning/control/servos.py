@@ -79,6 +79,11 @@ class Use:
         return self.servo.control is not None
 
     @property
+    def command_kind(self) -> str:
+        """The kind of its command, such as `position`; "" of a servo without one."""
+        return self.command.kind if self.command is not None else ""
+
+    @property
     def bare(self) -> ServoUse:
         """The servo as a plan has it, without its rate and its sensors."""
         return ServoUse(self.joint, self.definition, self.servo.name, self.command, 1, self.place, self.words)
