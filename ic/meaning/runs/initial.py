@@ -230,11 +230,10 @@ def resolve_initial(scope: Scope, body: MergedBlock, arm: ResolvedArm, uses: Seq
     uses  their servos, whose commands may give it
     """
     servos = {use.joint: use for use in uses}
-    known = dict.fromkeys(("q", "qd"), "")
     springs = [joint for joint in arm.moving if joint.name in arm.springs]
-    known |= {f"{joint.name}.{name}": "" for joint in (*arm.independent, *springs) for name in ("q", "qd")}
-    known |= dict.fromkeys(INITIAL.keys, "")
-    of_base = dict.fromkeys(INITIAL_OF_BASE if any(link.name == BASE for link in arm.links) else (), "")
+    of_joints = [f"{joint.name}.{name}" for joint in (*arm.independent, *springs) for name in ("q", "qd")]
+    known = dict.fromkeys(("q", "qd", *of_joints, *INITIAL.keys))
+    of_base = INITIAL_OF_BASE if any(link.name == BASE for link in arm.links) else ()
     for item in body.items.values():
         if not item.kind and item.name.partition(".")[0] in arm.failed:
             continue

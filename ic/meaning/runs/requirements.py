@@ -26,7 +26,7 @@ from ic.meaning.parameters.owner import Owner
 from ic.meaning.parameters.scope import Scope
 from ic.meaning.runs.expressions import is_over_time
 from ic.meaning.runs.linear import is_figure
-from ic.meaning.runs.step_errors import FLIPPED, is_step_error
+from ic.meaning.runs.step_errors import FLIPPED, is_step_error, number_required
 from ic.text.complaints import known_words
 from met import models
 from met.diagnostic import Help, Label, Problem, did_you_mean, error, write
@@ -37,7 +37,6 @@ from met.plan import Structure
 from met.plan.judged import MetricUse, Requirement
 from met.plan.outputs import metric_units
 from met.statistics.confidence import can_be_shown
-from met.trace import Scalar
 
 SHARE = Parameter(name="share", unit="1", doc="the share of all cases", share=True, above=0.0, at_most=1.0)
 CONFIDENCE = Parameter(name="confidence", unit="1", doc="the confidence", share=True, above=0.0, below=1.0)
@@ -205,17 +204,17 @@ def resolve_requirements(
             continue  # the metric failed (already reported)
         owner = Owner("", written.statement.place, "require", called=f"the limit on `{written.metric}`")
         wanted = Parameter(name="limit", unit=metrics[written.metric], doc="limit", share=written.metric in shares)
-        number = 0.0 if written.limit is None else _constant(scope, owner, wanted, written.limit)
+        number = 0.0 if written.limit is None else number_required(scope, owner, wanted, written.limit)
         share = confidence = None
         if written.share is not None:
-            share = _constant(
+            share = number_required(
                 scope,
                 _owner(written, "share"),
                 replace(SHARE, below=1.0, at_most=None) if written.percentile else SHARE,
                 written.share,
             )
         if written.confidence is not None:
-            confidence = _constant(scope, _owner(written, "confidence"), CONFIDENCE, written.confidence)
+            confidence = number_required(scope, _owner(written, "confidence"), CONFIDENCE, written.confidence)
         if (written.share is not None and share is None) or (written.confidence is not None and confidence is None):
             continue
         if share is not None and written.percentile and written.operator.startswith(">"):
@@ -247,21 +246,6 @@ def resolve_requirements(
 
 def _owner(written: WrittenRequirement, what: str) -> Owner:
     return Owner("", written.statement.place, "require", called=f"the {what} of the requirement on `{written.metric}`")
-
-
-def _constant(scope: Scope, owner: Owner, wanted: Parameter, expression: Expression) -> float | None:
-    """The number of an expression of a requirement, SI; None where it is not a number or varies (reported)."""
-    item = Item("", wanted.name, (), expression, None, place_of(expression))
-    number = scope.number(owner, wanted, item, record=False)
-    if isinstance(number, Scalar):
-        scope.complaints.error(
-            "D122",
-            f"the {wanted.name} of a requirement varies with the sweep",
-            place_of(expression),
-            help="it is the same for all cases: write a number that stands still",
-        )
-        return None
-    return number
 
 
 MetricOf = Callable[[Statement, Call], Name]

@@ -86,21 +86,27 @@ def resolve_step_errors(
 
 def _limit(scope: Scope, owner: Owner, limit: Expression, unit: str) -> tuple[float | None, bool]:
     """The limit, in SI or as a share of the metric; whether it is a share."""
-    item = Item("", "limit", (), limit, None, place_of(limit))
     value = None
     with scope.complaints.gather():
-        value = scope.evaluate(item)
+        value = scope.names.evaluate(limit)
     if value is None:
         return None, False
     share = isinstance(value, Value) and value.dimension == PURE
     wanted = Parameter(name="limit", unit="1" if share else unit, above=0.0, doc="limit", share=share)
+    return number_required(scope, owner, wanted, limit), share
+
+
+def number_required(scope: Scope, owner: Owner, wanted: Parameter, expression: Expression) -> float | None:
+    """The number of an expression in a requirement, such as its limit, SI; None where it is not a number or varies
+    (reported)."""
+    item = Item("", wanted.name, (), expression, None, place_of(expression))
     number = scope.number(owner, wanted, item, record=False)
     if isinstance(number, Scalar):
         scope.complaints.error(
             "D122",
-            "the limit of a requirement varies with the sweep",
-            place_of(limit),
+            f"the {wanted.name} of a requirement varies with the sweep",
+            place_of(expression),
             help="it is the same for all cases: write a number that stands still",
         )
-        return None, share
-    return (None if number is None else float(number)), share
+        return None
+    return number
