@@ -36,7 +36,7 @@ LONGEST_NAME = 40  # characters of a column's name that a message shows
 
 _HEADER = re.compile(r"(?P<name>[^\[\]]*)(?:\[(?P<unit>[^\[\]]*)\])?")  # spaces are cut off later, not tried here
 _CELL = re.compile(r',((?:[^",]|"[^"]*")*)')  # with the comma before it
-_WORD = re.compile(r"[^\W\d]\w*")
+WORD = re.compile(r"[^\W\d]\w*")  # of a cell, and of a row's name
 _NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?", re.ASCII)
 
 
@@ -91,7 +91,10 @@ class CsvTable:
     def cell(self, column: CsvColumn, number: int) -> CsvCell:
         """The cell of a column in the row of this number, from 0."""
         line, row = self.rows[number]
-        return CsvCell(column, _stripped(_cells(row)[column.number])[0], self._cell(line, row, column.number))
+        cells = _cells(row)
+        text, gap = _stripped(cells[column.number])
+        start = sum(len(cell) + 1 for cell in cells[: column.number]) + gap
+        return CsvCell(column, text, Place(self.file, line, start + 1, max(len(text), 1)))
 
     def quantity(self, cell: CsvCell) -> tuple[float, Measure]:
         """The number of a cell in SI, and the meaning of its column's unit. Raises Problem D193, D194."""
@@ -114,22 +117,21 @@ class CsvTable:
 
         Raises Problem D194 for a cell that is not a word below one that is.
         """
-        cells = [(_stripped(_cells(row)[column.number])[0], line, row) for line, row in self.rows]
-        if column.unit is not None or not cells or not _WORD.fullmatch(cells[0][0]):
+        if column.unit is not None or not self.rows or not WORD.fullmatch(self._text(column, 0)):
             return None
-        first = Label(self._cell(*cells[0][1:], column.number), "this column begins with one")
-        for cell, line, row in cells:
-            if not _WORD.fullmatch(cell):
+        cells = [self.cell(column, number) for number in range(len(self.rows))]
+        for cell in cells:
+            if not WORD.fullmatch(cell.text):
                 raise Problem(
                     error(
                         "D194",
-                        f"`{cell[:40]}` is no word" if cell else "there is no word here",
-                        self._cell(line, row, column.number),
-                        also=[first],
+                        f"`{cell.text[:40]}` is no word" if cell.text else "there is no word here",
+                        cell.place,
+                        also=[Label(cells[0].place, "this column begins with one")],
                         help="a column without a unit holds words, or pure numbers",
                     )
                 )
-        return [(cell, self._cell(line, row, column.number)) for cell, line, row in cells]
+        return [(cell.text, cell.place) for cell in cells]
 
     def _numbers(self, column: CsvColumn, measure: Measure) -> tuple[float, ...]:
         """The numbers of a column in SI. Raises Problem for a cell without one."""
@@ -148,23 +150,15 @@ class CsvTable:
         """Raise Problem D195 where the column's numbers, its times, do not rise."""
         for n, (before, after) in enumerate(itertools.pairwise(times)):
             if not before < after:
-                line, row = self.rows[n + 1]
                 raise Problem(
                     error(
                         "D195",
                         f"times of a file rise, and {after:g} s follows {before:g} s",
-                        self._cell(line, row, column.number),
-                        also=[Label(self._cell(*self.rows[n], column.number), "the row before")],
+                        self.cell(column, n + 1).place,
+                        also=[Label(self.cell(column, n).place, "the row before")],
                         help="sort the rows; for a jump, two times close together",
                     )
                 )
-
-    def _cell(self, line: int, row: str, number: int) -> Place:
-        """The place of cell `number` in a row's text."""
-        cells = _cells(row)
-        text, gap = _stripped(cells[number])
-        start = sum(len(cell) + 1 for cell in cells[:number]) + gap
-        return Place(self.file, line, start + 1, max(len(text), 1))
 
 
 def _si(text: str, measure: Measure) -> float | None:

@@ -11,12 +11,11 @@ or remarks, which are checked only when used. Columns `com.x`, `com.y` and `com.
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import Final, TypeGuard
 
 from ic.grammar.syntax import Call, Expression, Name, String, Word
-from ic.meaning.definitions.csv_files import CsvCell, CsvColumn, CsvTable, missing_column
+from ic.meaning.definitions.csv_files import WORD, CsvCell, CsvColumn, CsvTable, missing_column
 from ic.text.complaints import known_words
 from met.diagnostic import Diagnostic, Label, Place, Problem, did_you_mean, error
 from met.frozen import frozen
@@ -26,8 +25,6 @@ ALL: Final = "all"
 USAGE: Final = 'write `let NAME = csv("FILE.csv");`'
 VECTORS: Final = (("x", "y", "z"), ("xx", "yy", "zz", "xy", "xz", "yz"), ("xx", "yy", "zz"))
 """Last words of columns that form a vector together, in order."""
-
-_WORD = re.compile(r"[^\W\d]\w*")
 
 
 def is_row_table(value: Expression) -> TypeGuard[Call]:
@@ -125,7 +122,7 @@ def row_table(call: Call, get: Callable[[String], CsvTable]) -> RowTable:
     rows: dict[str, int] = {}
     for number in range(len(table.rows)):
         cell = table.cell(first, number)
-        if not _WORD.fullmatch(cell.text):
+        if not WORD.fullmatch(cell.text):
             message = f"`{cell.text[:40]}` is no name of a row" if cell.text else "a row without a name"
             helps = "a name has letters, digits and `_`, and begins with no digit: `bodies.boom_2.mass` asks for one"
             raise Problem(error("D382", message, cell.place, also=[label], help=helps))
