@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import os
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from string import Template
 from typing import get_args
 
@@ -137,9 +137,9 @@ def write(texts: Mapping[str, str], *, force: bool) -> None:
         _check_place(path)
     existing = [path for path in texts if os.path.lexists(path)]
     if existing and not force:
-        raise Problem(
-            error("E344", _already_there(existing), help="--force writes over it; -o writes to another place")
-        )
+        named = ", ".join(f"`{path}`" for path in existing)
+        message = f"{named} {'is' if len(existing) == 1 else 'are'} there already"
+        raise Problem(error("E344", message, help="--force writes over it; -o writes to another place"))
     for path, text in texts.items():
         if folder := os.path.dirname(path):
             os.makedirs(folder, exist_ok=True)
@@ -173,8 +173,3 @@ def _check_place(path: str) -> None:
         raise Problem(error("E338", f"cannot write `{path}`: it is not a regular file", help=helps))
     if os.path.exists(folder) and not os.path.isdir(folder):
         raise Problem(error("E338", f"cannot write `{path}`: `{folder}` is a file, not a folder", help=helps))
-
-
-def _already_there(paths: Sequence[str]) -> str:
-    named = ", ".join(f"`{path}`" for path in paths)
-    return f"{named} is there already" if len(paths) == 1 else f"{named} are there already"

@@ -128,9 +128,8 @@ class DefinitionChecks:
     def _all(self) -> Iterator[tuple[Definition, Check]]:
         """Every definition with its check, in the order of `met check`."""
         definitions = self._definitions
-        for kind in EXPERIMENTS:
-            for definition in definitions.of_kind(kind).values():
-                yield definition, partial(self._experiment, definition)
+        for definition in definitions.experiments.values():
+            yield definition, partial(self._experiment, definition)
         loaded = definitions.have_payloads()
         for definition in definitions.of_kind("arm").values():
             yield definition, partial(_arm, definition, resolve_arm if loaded else check_arm)
@@ -168,9 +167,7 @@ class _Keys:
 
     def __init__(self, deck: Deck, definitions: Definitions, complaints: Complaints) -> None:
         """Digest what many definitions share: the deck's `let`s, its arms and its servos."""
-        self._known = {
-            name: definition for kind in EXPERIMENTS for name, definition in definitions.of_kind(kind).items()
-        }
+        self._known = definitions.experiments
         self._of_kind = {kind: definitions.of_kind(kind) for kind in ("run", "arm", "servo")}
         everything = [
             definition for kind in (*EXPERIMENTS, "arm", "servo") for definition in definitions.of_kind(kind).values()

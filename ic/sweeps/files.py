@@ -8,7 +8,6 @@ from collections.abc import Sequence
 import numpy as np
 
 from ic.grammar.syntax import Group, Name, Setting, String, Unit, Word
-from ic.language import EXPERIMENTS
 from ic.meaning.definitions.resolve import Definition, Definitions
 from ic.meaning.expressions.conditions import VariedPath
 from ic.meaning.expressions.quantity import Value
@@ -77,7 +76,6 @@ def command_line_sweep(
         helps = [write(base, f"name the run that it is of: `{base}`", old=run.name)] if base in runs else []
         also = [Label(run.place, "defined here")]
         raise Problem(error("D288", message, place, also=also, help=helps or known_words("name a run", runs)))
-    taken = [name for kind in EXPERIMENTS for name in definitions.of_kind(kind)]
-    words = (Word("sweep", place), Word(varied_name(run.name, taken), place))
+    words = (Word("sweep", place), Word(varied_name(run.name, definitions.experiments), place))
     group = Group(words, None, Name((Word(run.name, place),), place), entries, place)
     return Definition("sweep", words[1].text, group)

@@ -220,11 +220,12 @@ class _SearchReader:
                 help=f"write `{self.usage}`",
             )  # fmt: skip
 
-    def _once(self, key: str, place: Place) -> None:
-        """Note an entry as written. Raises Problem D040 where it is there twice."""
+    def _once(self, key: str, place: Place, done: str = "written") -> None:
+        """Note a key, or a path that is chosen, as there. Raises Problem D040 where it is there twice. done: how a
+        message says that it is there"""
         if key in self.written:
             raise Problem(
-                error("D040", f"`{key}` is written twice", place, also=[Label(self.written[key], "first")],
+                error("D040", f"`{key}` is {done} twice", place, also=[Label(self.written[key], "first")],
                       help="leave one out")
             )  # fmt: skip
         self.written[key] = place
@@ -275,12 +276,7 @@ class _SearchReader:
     def _choose(self, entry: Setting) -> None:
         """Add a parameter that the search may choose, with its ends. Raises Problem where it is added twice."""
         path = path_of(entry)
-        if path in self.written:
-            raise Problem(
-                error("D040", f"`{path}` is chosen twice", path_place(entry),
-                      also=[Label(self.written[path], "first")], help="leave one out")
-            )  # fmt: skip
-        self.written[path] = path_place(entry)
+        self._once(path, path_place(entry), "chosen")
         if entry.operator == "+=":
             raise Problem(error("D056", f"nothing to append to in a {self.definition.kind}", path_place(entry),
                                 help="write `=`"))  # fmt: skip

@@ -288,6 +288,11 @@ class Definitions:
             above = ancestor
         return block
 
+    @property
+    def experiments(self) -> dict[str, Definition]:
+        """The definitions that have cases to run, by name: runs, then sweeps, searches and tunings."""
+        return {name: definition for kind in EXPERIMENTS for name, definition in self._by_kind[kind].items()}
+
     def run_blocks(self) -> list[MergedBlock]:
         """The blocks of all runs, each merged with its bases; without those that failed (already reported)."""
         blocks = [self.block(run) for run in self._by_kind["run"].values()]
@@ -530,7 +535,7 @@ class Definitions:
                 )
 
     def _defaults(self) -> list[Definition]:
-        return [d for kind in EXPERIMENTS for d in self._by_kind[kind].values() if d.default]
+        return [definition for definition in self.experiments.values() if definition.default]
 
     def writes(self, definition: Definition) -> bool:
         """Return True if the deck itself, not an included file, contains this definition."""

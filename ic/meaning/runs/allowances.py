@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 
 from ic.grammar.syntax import Entry, Name, Statement, String, place_of
-from ic.language import EXPERIMENTS, OF_A_RUN
+from ic.language import OF_A_RUN
 from ic.meaning.definitions.resolve import Definition, Definitions
 from ic.text.complaints import Complaints
 from met.diagnostic import Diagnostic, Label, Place, did_you_mean, leave_out
@@ -104,7 +104,7 @@ def warn_of_unneeded(
         return
     runs = definitions.of_kind("run")
     names = _with_parts(definitions, checked)
-    for definition in (definition for kind in EXPERIMENTS for definition in definitions.of_kind(kind).values()):
+    for definition in definitions.experiments.values():
         sweep = definition if definition.kind in OF_A_RUN else None
         run = definition if sweep is None else runs.get(definition.run_name)
         if definition.name not in names and run is not None:
@@ -121,13 +121,11 @@ def warn_of_unneeded(
 
 def _with_parts(definitions: Definitions, checked: Iterable[Definition]) -> set[str]:
     """The names of these runs and sweeps, including their parts."""
-    names: set[str] = set()
-    waiting = list(checked)
+    names, known, waiting = set[str](), definitions.experiments, list(checked)
     while waiting:
         definition = waiting.pop()
         if definition.name not in names:
             names.add(definition.name)
-            known = {name: d for kind in EXPERIMENTS for name, d in definitions.of_kind(kind).items()}
             waiting += (known[part.text] for part in definition.parts if part.text in known)
     return names
 
