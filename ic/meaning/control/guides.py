@@ -3,21 +3,21 @@ ticks."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any, Final
 
 import numpy as np
 
-from ic.grammar.syntax import place_of, spell
+from ic.grammar.syntax import spell
 from ic.meaning.control.courses import use_component
 from ic.meaning.control.schedule import Rate, Ticker, fixed_rate
 from ic.meaning.control.servos import Use
 from ic.meaning.definitions.merge import Item, MergedBlock
 from ic.meaning.expressions.cycles import components
 from ic.meaning.mechanics.arm import ResolvedArm
-from ic.meaning.parameters.models import find_model, refuse_values, use_model, word_of
+from ic.meaning.parameters.models import model_of_entry, refuse_values, use_model
 from ic.meaning.parameters.owner import COMPILED_ALONE, Owner, a_model
 from ic.meaning.parameters.relations import check_names
 from ic.meaning.parameters.scope import Scope
@@ -154,15 +154,8 @@ def check_period(scope: Scope, guide: Guiding, rate: Rate) -> None:
 
 def _guide(scope: Scope, item: Item, arm: ResolvedArm, uses: list[Use], duration: float | None) -> Guiding | None:
     """The guide of an entry; None where it has a mistake, which is reported."""
-    if item.detail or item.value is None:
-        place = item.detail[0].place if item.detail else item.place
-        message = f"guide `{item.name}` has no model"
-        message = f"`{item.detail[0].text}` after the name of a guide" if item.detail else message
-        scope.complaints.error(
-            "D270", message, place, help=[USAGE, known_words("guide models", sorted(models.available(KIND)))]
-        )
-        return None
-    guide = find_model(scope, KIND, word_of(item.value), place_of(item.value))
+    helps = [USAGE, known_words("guide models", sorted(models.available(KIND)))]
+    guide = model_of_entry(scope, item, KIND, "D270", helps)
     if guide is None or refuse_values(scope, item.value, [p.name for p in guide.parameters]):
         return None
     body = item.body or MergedBlock()
@@ -243,12 +236,11 @@ def _remark_idle(scope: Scope, guide: Any, item: Item, values: Mapping[str, Any]
 
 
 def _of_joints(
-    scope: Scope, owner: Owner, guide: Any, body: MergedBlock, arm: ResolvedArm, joints: Iterable[str]
+    scope: Scope, owner: Owner, guide: Any, body: MergedBlock, arm: ResolvedArm, joints: Sequence[str]
 ) -> None:
     """The parameters of each joint: those written for it, else those written for all, which a path without a joint
     reaches."""
     kinds = {joint.name: joint.kind for joint in arm.moving}
-    joints = list(joints)
     for wanted in guide.of_joint:
         general = body.get(wanted.name)
         parts = [part for part in components(general, len(joints)) if part is not None]
@@ -268,7 +260,7 @@ def _of_joints(
         for joint in joints:
             own = body.get(f"{joint}.{wanted.name}")
             all_of_them = () if own is not None else (owner.path,)
-            item = own if own is not None else general
+            item = own or general
             item = replace(item, homes=all_of_them) if item is not None else None
             whose = Owner(
                 f"joint `{joint}` of {owner.label}",

@@ -10,7 +10,7 @@ from ic.language.unit_words import unit_here
 from ic.meaning.control.schedule import Ticker, fixed_rate
 from ic.meaning.definitions.merge import Item, MergedBlock
 from ic.meaning.mechanics.arm import ResolvedArm
-from ic.meaning.parameters.models import find_model, refuse_values, use_model, word_of, words_chosen
+from ic.meaning.parameters.models import find_model, model_of_entry, refuse_values, use_model, word_of, words_chosen
 from ic.meaning.parameters.owner import Owner, a_model
 from ic.meaning.parameters.relations import check_names
 from ic.meaning.parameters.scope import Scope
@@ -123,18 +123,9 @@ def resolve_link_sensors(
 
 def _sensor(scope: Scope, item: Item, arm: ResolvedArm, payloads: tuple[Payload, ...]) -> Sensing | None:
     """The sensor of an entry; None where it has a mistake, which is reported."""
-    if item.detail or item.value is None:
-        place = item.detail[0].place if item.detail else item.place
-        message = (
-            f"`{item.detail[0].text}` after the name of a sensor"
-            if item.detail
-            else (f"sensor `{item.name}` has no model")
-        )
-        scope.complaints.error(
-            "D280", message, place, help=[USAGE_ON_LINK, known_words("sensors of links", _of_links())]
-        )
-        return None
-    sensor = find_model(scope, KIND, word_of(item.value), item.value_place)
+    on_links = sorted(name for name, model in models.available(KIND).items() if model.measures is not None)
+    others = known_words("sensors of links", on_links)
+    sensor = model_of_entry(scope, item, KIND, "D280", [USAGE_ON_LINK, others])
     if sensor is None or refuse_values(scope, item.value, [p.name for p in sensor.parameters]):
         return None
     if sensor.measures is None:
@@ -144,7 +135,7 @@ def _sensor(scope: Scope, item: Item, arm: ResolvedArm, payloads: tuple[Payload,
             item.value_place,
             help=[
                 f"write `sensor QUANTITY = {sensor.name} {{ ... }}` in a servo, such as of `qd`",
-                known_words("sensors of links", _of_links()),
+                others,
             ],
         )
         return None
@@ -160,7 +151,3 @@ def _sensor(scope: Scope, item: Item, arm: ResolvedArm, payloads: tuple[Payload,
     rate = fixed_rate(scope, owner, rate_item, owner.label, doc="how often it reads") if rate_item is not None else None
     words = [parameter for parameter in sensor.parameters if parameter.shape == "word" and not parameter.names]
     return Sensing(item.name, rate, item.place, sensor.name, words_chosen(words, body), values or {})
-
-
-def _of_links() -> list[str]:
-    return sorted(name for name, model in models.available(KIND).items() if model.measures is not None)

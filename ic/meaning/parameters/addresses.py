@@ -41,7 +41,8 @@ def _of_path(definitions: Definitions, block: MergedBlock, item: Item, rates: tu
         case [servo, _] if servo in definitions.of_kind("servo"):
             return [_write(item, f"with {item.name} = {value};")]
         case [thing, key] if (thing in joints and key in OF_JOINT) or (thing in links and key in LINK.keys):
-            return _in_arm(arm, thing, key, value)
+            changed = f"`arm OTHER like {arm} {{ {thing} {{ {key} = {value}; }} }}`"
+            return [f"it is the arm's: {changed}, and `arm = OTHER;` here"]
         case [rate] if rate in rates:
             return [_write(item, f"rates {{ {rate} = {value}; }}")]
         case ["rates" | "tolerances" | "initial" | "environment" as head, *rest] if len(rest) == 1:
@@ -76,10 +77,6 @@ def _in_its_block(block: MergedBlock, item: Item, helps: list[str]) -> list[str]
 def _write(item: Item, entry: str) -> Help:
     """The help that says to write an entry in place of the item's, with its value if there is one."""
     return write(entry, where="entry") if item.value is not None and not item.appended else Help(f"write `{entry}`")
-
-
-def _in_arm(arm: str, thing: str, key: str, value: str) -> list[str]:
-    return [f"it is the arm's: `arm OTHER like {arm} {{ {thing} {{ {key} = {value}; }} }}`, and `arm = OTHER;` here"]
 
 
 def _of_arm(definitions: Definitions, block: MergedBlock) -> tuple[list[str], list[str], str]:

@@ -39,9 +39,8 @@ def overriding_place(item: Item) -> Place | None:
 
 def words_chosen(parameters: Sequence[Parameter], body: MergedBlock) -> tuple[tuple[str, str], ...]:
     """The words that a body writes for these parameters, without defaults."""
-    words = ((parameter.name, word_written(parameter, body)) for parameter in parameters)
-    defaults = {parameter.name: parameter.default for parameter in parameters}
-    return tuple((name, word) for name, word in words if word != defaults[name])
+    words = ((parameter, word_written(parameter, body)) for parameter in parameters)
+    return tuple((parameter.name, word) for parameter, word in words if word != parameter.default)
 
 
 def word_written(wanted: Parameter, body: MergedBlock) -> str:
@@ -145,6 +144,19 @@ def find_bare_model(scope: Scope, kind: models.Kind, item: Item, remedy: str) ->
         )
         return None
     return find_model(scope, kind, name, place)
+
+
+def model_of_entry(scope: Scope, item: Item, kind: models.Kind, code: str, helps: Iterable[str]) -> Any:
+    """The declaration that an entry `KIND NAME = MODEL { ... }` names; None where there is none, or where a word stands
+    behind the name (already reported). code, helps: of the report"""
+    if item.detail or item.value is None:
+        place = item.detail[0].place if item.detail else item.place
+        message = f"{kind} `{item.name}` has no model"
+        if item.detail:
+            message = f"`{item.detail[0].text}` after the name of {with_article(kind)}"
+        scope.complaints.error(code, message, place, help=helps)
+        return None
+    return find_model(scope, kind, word_of(item.value), item.value_place)
 
 
 def find_model(scope: Scope, kind: models.Kind, name: str | None, place: Place) -> Any:

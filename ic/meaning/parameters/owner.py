@@ -147,7 +147,7 @@ OF_A_FILE = NotSweepable("is read from a file", "it is one for the whole sweep")
 
 def several(paths: Sequence[str]) -> NotSweepable:
     """The reason for a path that is made of several numbers, which have these paths."""
-    return NotSweepable(f"is made of {len(paths)} numbers", one_of=_one_of_them(paths))
+    return NotSweepable(f"is made of {len(paths)} numbers", one_of=f"one of them: {_listed(paths)}")
 
 
 def follows(other: str, paths: Sequence[str]) -> NotSweepable:
@@ -164,10 +164,6 @@ def a_model(kind: str, path: str) -> NotSweepable:
 def chosen(path: str, choices: str) -> NotSweepable:
     """The reason for what a sweep chooses by another `path`, over `choices` in words, and what is set by it."""
     return NotSweepable(DECIDES, f"vary `{path}` over {choices}", setting=f"set `{path}`")
-
-
-def _one_of_them(paths: Sequence[str]) -> str:
-    return f"one of them: {_listed(paths)}"
 
 
 def _listed(paths: Sequence[str]) -> str:

@@ -32,7 +32,7 @@ from ic.meaning.parameters.value_checks import ValueChecks, how_to_write
 from ic.text.complaints import Complaints
 from met.diagnostic import Label, Place, Problem, did_you_mean, error
 from met.parameter import Parameter
-from met.plan import Origin, Quantity
+from met.plan import Formula, Origin, Quantity
 from met.trace import Graph, Real, Scalar
 from met.units import PURE
 
@@ -565,7 +565,6 @@ class Scope:
     def quantities(self, *, auxiliary: bool = False) -> tuple[dict[str, Any], list[Scalar]]:
         """The parameters in a plan's form, and the scalars of its formulas, in order. auxiliary: including auxiliary
         ones"""
-        from met.plan import Formula
 
         outputs: list[Scalar] = []
         quantities = {}
