@@ -517,15 +517,15 @@ def _refuse(entry: object, words: list[str], base: str) -> None:
     )
 
 
-def distinguished(column: Column) -> list[float] | list[str]:
-    """What tells the values of a column apart: numbers in SI, or the texts of its options."""
+def compared_values(column: Column) -> list[float] | list[str]:
+    """The values of a column as cases are told apart by them: numbers in SI, or the texts of its options."""
     return column.values.tolist() if isinstance(column, VariedPath) else [option.text for option in column.options]
 
 
 def check_no_equal_cases(columns: Sequence[Column], places: Sequence[Place]) -> None:
     """Report equal rows: equal values are equal cases. places: of the rows, or of the first column's numbers."""
     seen: dict[tuple[float | str, ...], int] = {}
-    for n, row in enumerate(zip(*map(distinguished, columns), strict=True)):
+    for n, row in enumerate(zip(*map(compared_values, columns), strict=True)):
         if row in seen:
             if isinstance(columns[0], ChoiceColumn) and not places:
                 places = [option.place for option in columns[0].options]

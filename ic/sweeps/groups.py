@@ -280,7 +280,7 @@ class _Sweep:
         return ((built, scope), rows), dropped
 
     def _with_macros(self, sweep: Sweep, choices: Choices) -> _Read:
-        """What the sweep reads as where these choices set macros of the deck; read once for each set. Raises Problem
+        """The sweep as it reads where these choices set macros of the deck; read once for each set. Raises Problem
         D226 where it varies something else then."""
         macros = tuple(f"{column.macro}={option.text}" for column, option in choices if column.macro)
         if macros not in self.read_so_far:

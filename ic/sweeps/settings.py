@@ -31,7 +31,7 @@ from ic.meaning.expressions.names import Names
 from ic.meaning.expressions.quantity import Value, ValueList
 from ic.meaning.parameters.models import word_of
 from ic.meaning.parameters.scope import VARIES, Scope
-from ic.sweeps.axes import Column, Sweep, SweepAxis, distinguished
+from ic.sweeps.axes import Column, Sweep, SweepAxis, compared_values
 from ic.sweeps.choices import OF_RUN, ONE_OF_TWO, SENSOR, decides_structure, in_servo, keys_of, nested_entry
 from ic.text.complaints import Complaints
 from met import units
@@ -179,7 +179,7 @@ def _without(axis: SweepAxis, paths: Collection[str]) -> SweepAxis:
     columns = [column for column in axis.columns if column.path not in paths]
     if len(columns) == len(axis.columns) or axis.design not in ("", "saltelli") or not columns:
         return replace(axis, columns=tuple(columns))
-    rows = zip(*map(distinguished, columns), strict=True)
+    rows = zip(*map(compared_values, columns), strict=True)
     first = {row: number for number, row in reversed(list(enumerate(rows)))}
     return replace(axis, columns=tuple(_rows(column, sorted(first.values())) for column in columns))
 

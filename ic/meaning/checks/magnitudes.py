@@ -382,7 +382,8 @@ Remark = Callable[[OddBody], tuple[str, list[str]]]
 
 
 def _unlikely(radius: float, odd: OddBody) -> float:
-    """How far this radius of gyration is from a usual one on such an arm or of such a shape, as a ratio's logarithm."""
+    """The distance of a radius of gyration, m, from a usual one of such an arm or shape, as a ratio's logarithm; 0
+    where nothing is usual."""
     usual = USUAL_GYRATION * odd.length
     return abs(math.log(radius / usual)) if radius > 0.0 and 0.0 < usual < math.inf else 0.0
 

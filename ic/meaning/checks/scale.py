@@ -58,7 +58,7 @@ class Scale:
 
     @property
     def nearness(self) -> float:
-        """How near the multiple is to an end of its usual range: 1 at the end, more outside; of a number 0 it is 0."""
+        """The multiple beside the nearer end of its usual range: 1 at the end, more outside; of a number 0 it is 0."""
         multiple = self.multiple
         return max(multiple / self.high, self.low / multiple) if multiple != 0.0 and math.isfinite(multiple) else 0.0
 
@@ -70,7 +70,7 @@ class Scale:
 
     @property
     def times(self) -> str:
-        """How many times the other number it is, in words."""
+        """The multiple in words, `, 3 times the arm's reach, 2 m`; "" where there is no other number."""
         return f", {self.multiple:.4g} times {self.other}" if self.other else ""
 
     @property

@@ -329,17 +329,17 @@ class Ticker:
 
     @property
     def label(self) -> str:
-        """Its name in words: "guide `tip`"."""
+        """The guide or sensor in words: "guide `tip`"."""
         return f"{self.kind} `{self.name}`"
 
     @property
     def path(self) -> str:
-        """The path of its parameters: "guides.tip"."""
+        """The path of the guide's or sensor's parameters: "guides.tip"."""
         return f"{self.kind}s.{self.name}"
 
     @property
     def ticks(self) -> bool:
-        """Whether it has a computer."""
+        """True of a guide or sensor that has a computer, which ticks; of another the rate says nothing."""
         return True
 
 

@@ -96,7 +96,7 @@ def ambiguous_unit(value: Value, text: str, wanted: Measure) -> AmbiguousUnit | 
 
 
 def _hertz_for_rate(value: Value) -> AmbiguousUnit:
-    """What is unclear about a value in Hz where 1/s is wanted, with what to write for either meaning."""
+    """The two meanings of a value in Hz where 1/s is wanted, with what to write for each."""
     number = _number(value)
     if isinstance(value.number, Scalar):
         return AmbiguousUnit(
@@ -113,7 +113,7 @@ def _hertz_for_rate(value: Value) -> AmbiguousUnit:
 
 
 def _no_hertz(value: Value) -> AmbiguousUnit | None:
-    """1/s for Hz; None where it was computed, as from a period."""
+    """The two meanings of a value in 1/s where Hz is wanted; None of one that was computed, as from a period."""
     if _unit(value) is None:
         return None
     number = _number(value)
@@ -135,8 +135,8 @@ def _no_hertz(value: Value) -> AmbiguousUnit | None:
 
 
 def _hertz_for_rad(value: Value, text: str) -> AmbiguousUnit:
-    """What is unclear about a value in a unit with Hz, such as V/Hz, where one with rad, V*s/rad, is wanted, with what
-    to write for either meaning."""
+    """The two meanings of a value in a unit with Hz, such as V/Hz, where one with rad, V*s/rad, is wanted, with what to
+    write for each."""
     unit = _unit(value)
     if unit is not None and "kHz" not in unit.text:
         number = _in(value, measure_of(unit))
@@ -153,8 +153,8 @@ def _hertz_for_rad(value: Value, text: str) -> AmbiguousUnit:
 
 
 def _no_angle(value: Value, text: str, power: int) -> AmbiguousUnit:
-    """What is unclear about a value without an angle, such as 1/mm, where a unit with rad, rad/m, is wanted, with what
-    to write for radians and for turns. power: of the missing rad."""
+    """The two meanings of a value without an angle, such as 1/mm, where a unit with rad, rad/m, is wanted, with what to
+    write for radians and for turns. power: of the missing rad."""
     unit = _unit(value)
     number = _in(value, ONE if unit is None else measure_of(unit))
     plain = unit.text if unit is not None else units.text(value.dimension)
@@ -173,7 +173,7 @@ def _no_angle(value: Value, text: str, power: int) -> AmbiguousUnit:
 
 
 def _angle_for_none(value: Value, text: str) -> AmbiguousUnit | None:
-    """1/cycle, 1/deg where no angle is declared: it counts in radians."""
+    """The meaning of a value in 1/cycle or 1/deg where no angle is wanted, which counts in radians; None of others."""
     unit = _unit(value)
     if unit is None or not measure_of(unit).turns:
         return None

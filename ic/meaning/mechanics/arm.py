@@ -262,6 +262,7 @@ def check_arm(scope: Scope, definition: Definition) -> None:
 
 
 def _stray(scope: Scope, item: Item, block: MergedBlock) -> None:
+    """Report an entry that an arm's block cannot have (D082, D083), with what may have been meant."""
     known = [other.name for other in block.items.values() if other.kind in ARM.named]
     if item.kind:
         scope.complaints.error(
@@ -370,6 +371,7 @@ def _joint(
 
 
 def _loop(scope: Scope, item: Item, homes: tuple[str, ...], links: Mapping[str, None]) -> Part:
+    """The loop of an entry of an arm, with its pin's numbers entered; none where it has a mistake (reported: D213)."""
     owner = Owner(f"loop `{item.name}`", item.place, item.name, homes=homes)
     if item.body is None or item.value is not None or item.detail:
         helps = f"write `loop {item.name} {{ leader = JOINT;  link = ...;  to = ...;  branch = left; }}`"
@@ -531,6 +533,7 @@ def _axis(scope: Scope, owner: Owner, kind: str, item: Item | None) -> None:
 
 
 def _named_axis(value: Expression | None) -> tuple[float, float, float] | None:
+    """The unit vector of an axis that is written by its name, such as `-x`; None of other expressions."""
     sign = 1.0
     if isinstance(value, Unary) and value.operator in ("-", "+"):
         sign, value = (-1.0 if value.operator == "-" else 1.0), value.operand
@@ -585,6 +588,7 @@ def check_tree(scope: Scope, name: str, links: list[Link], joints: list[Joint], 
 
 
 def _complain_loop(scope: Scope, loop: list[Joint]) -> None:
+    """Report joints that make a loop which does not hang on the base (D086), from the parent of the first."""
     path = " -> ".join([loop[0].parent, *(joint.child for joint in loop)])
     scope.complaints.error(
         "D086",

@@ -237,7 +237,7 @@ def _free(scope: Scope, item: Item, arm: ResolvedArm) -> ResolvedArm:
 
 
 def base_meshes(scope: Scope, arm: ResolvedArm) -> tuple[Mesh, ...]:
-    """What the base looks like where it is no link of the arm: by the file that the arm is made from."""
+    """The meshes of a base that is no link of the arm, by the file that the arm is made from; none of other bases."""
     if any(link.name == BASE for link in arm.links) or BASE in arm.failed:
         return ()
     written = scope.definitions.base_from_file(arm.name, of_mass=False)
