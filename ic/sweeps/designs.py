@@ -298,9 +298,8 @@ def _part(entry: Setting, names: Names, paths: Mapping[str, Place]) -> DrawnPara
     arguments = tuple(float(value.number) for value in values)
     _check_arguments(name, arguments, values)
     unit = unit or next((value.unit for value in values if value.unit is not None), None)
-    if unit is not None and measure_of(unit).dimension != values[0].dimension:
-        unit = None
-    return DrawnParameter(path, entry.place, name, arguments, values[0], unit_of_plan(unit))
+    shown = unit_of_plan(unit, values[0].dimension)
+    return DrawnParameter(path, entry.place, name, arguments, values[0], shown)
 
 
 def in_unit(expression: Expression, unit: Unit | None) -> Expression:

@@ -19,7 +19,7 @@ from ic.meaning.definitions.resolve import Definition, Definitions
 from ic.meaning.expressions.conditions import VariedPath
 from ic.meaning.expressions.evaluate import PURE, evaluate_number
 from ic.meaning.expressions.names import Names
-from ic.meaning.expressions.quantity import Value, measure_of, unit_of_plan
+from ic.meaning.expressions.quantity import Value, unit_of_plan
 from ic.meaning.parameters.models import word_of
 from ic.meaning.runs.allowances import ALLOW
 from ic.sweeps.axes import Sweep, SweepAxis, read_sweep, varied_path, whole_number
@@ -131,9 +131,8 @@ def read_search(
     rows = search_method(search).ask()
     columns = []
     for number, choice in enumerate(chosen):
-        unit = unit_of_plan(choice.with_unit.unit if choice.with_unit is not None else choice.low.unit)
-        if unit is not None and measure_of(unit).dimension != choice.low.dimension:
-            unit = None
+        written = choice.with_unit.unit if choice.with_unit is not None else choice.low.unit
+        unit = unit_of_plan(written, choice.low.dimension)
         columns.append(varied_path(graph, choice.parameter.path, choice.place, rows[:, number], choice.low, unit))
     for number, column in enumerate(against.varied if against is not None else (), start=len(chosen)):
         columns.append(VariedPath(column.path, column.place, rows[:, number], column.value, column.unit, column.scale))
@@ -316,9 +315,8 @@ class _SearchReader:
         if not np.isfinite(ends[1] - ends[0]):
             message = f"the ends of this `{name}` are too far apart: their difference is no number"
             raise Problem(error("D361", message, high.place, help="take ends that a machine could have"))
-        unit_shown = unit_of_plan(unit or low.unit or high.unit)
-        text = unit_shown.text if unit_shown is not None and measure_of(unit_shown).dimension == low.dimension else ""
-        parameter = SearchedParameter(path, *ends, RANGES[name], text)
+        shown = unit_of_plan(unit or low.unit or high.unit, low.dimension)
+        parameter = SearchedParameter(path, *ends, RANGES[name], shown.text if shown is not None else "")
         return _Chosen(parameter, path_place(entry), low, entry.value if isinstance(entry.value, WithUnit) else None)
 
     def _refuse(self, entry: object, words: list[str]) -> None:

@@ -12,6 +12,7 @@ import numpy as np
 from ic.meaning.control.servos import Use, differ_beyond_rounding, unit_written
 from ic.meaning.definitions.merge import Item, MergedBlock
 from ic.meaning.mechanics.arm import ResolvedArm
+from ic.meaning.parameters.models import idleness
 from ic.meaning.parameters.owner import XYZ, Settled
 from ic.meaning.parameters.scope import Scope
 from met import models
@@ -61,20 +62,18 @@ def remark_idle(scope: Scope, environment: Any, item: Item, values: Mapping[str,
 
     values  with the bodies that links and payloads are parts of, in the place of their names
     """
-    numbers = [x for value in values.values() for x in (value if isinstance(value, tuple) else (value,))]
-    if environment.idle is None or any(isinstance(x, Scalar) for x in numbers):
-        return False
-    idleness = environment.idle(SimpleNamespace(**values), duration)
-    if idleness is not None:
+    idle = idleness(environment, values, duration)
+    if idle is not None:
+        keys, why = idle
         body = item.body or MergedBlock()
-        written = [part for name in idleness[0] if (part := body.get(name)) is not None and part.value is not None]
+        written = [part for name in keys if (part := body.get(name)) is not None and part.value is not None]
         scope.complaints.remark(
             "D168",
-            f"environment `{item.name}` never acts: {idleness[1]}",
+            f"environment `{item.name}` never acts: {why}",
             written[0].value_place if written else item.place,
             help=leave_out("change that, or leave it out", item.place),
         )
-    return idleness is not None
+    return idle is not None
 
 
 def remark_kinds(scope: Scope, environment: Any, item: Item, arm: ResolvedArm) -> None:

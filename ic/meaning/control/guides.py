@@ -17,7 +17,7 @@ from ic.meaning.control.servos import Use
 from ic.meaning.definitions.merge import Item, MergedBlock
 from ic.meaning.expressions.cycles import components
 from ic.meaning.mechanics.arm import ResolvedArm
-from ic.meaning.parameters.models import model_of_entry, refuse_values, use_model
+from ic.meaning.parameters.models import idleness, model_of_entry, refuse_values, use_model
 from ic.meaning.parameters.owner import COMPILED_ALONE, Owner, a_model
 from ic.meaning.parameters.relations import check_names
 from ic.meaning.parameters.scope import Scope
@@ -28,7 +28,7 @@ from met.frozen import frozen
 from met.plan import COMPONENTS, Course, GuideUse, Structure
 from met.plan.channel import carries
 from met.plan.defaults import component
-from met.trace import Real, Scalar
+from met.trace import Real
 
 KIND: Final = "guide"
 COURSES_BEHIND_GUIDES: Final = frozenset({"pulse"})
@@ -216,22 +216,18 @@ def _guide(scope: Scope, item: Item, arm: ResolvedArm, uses: list[Use], duration
 
 def _remark_idle(scope: Scope, guide: Any, item: Item, values: Mapping[str, Any], duration: float) -> None:
     """Report a guide that does nothing, or a part of it, by its written constants."""
-    numbers = [x for value in values.values() for x in (value if isinstance(value, tuple) else (value,))]
-    if guide.idle is None or any(isinstance(x, Scalar) for x in numbers):
-        return
-    idleness = guide.idle(SimpleNamespace(**values), duration)
-    if idleness is not None:
-        written = [part for name in idleness[0] if (part := (item.body or MergedBlock()).get(name)) is not None]
-        needed = [
-            parameter for parameter in guide.parameters if parameter.name in idleness[0] and parameter.default is None
-        ]
+    idle = idleness(guide, values, duration)
+    if idle is not None:
+        keys, why = idle
+        written = [part for name in keys if (part := (item.body or MergedBlock()).get(name)) is not None]
+        needed = [parameter for parameter in guide.parameters if parameter.name in keys and parameter.default is None]
         scope.complaints.remark(
             "D301",
-            f"guide `{item.name}` {idleness[1]}",
+            f"guide `{item.name}` {why}",
             (written[0] if written else item).value_place,
             help="change that, or leave it out"
             if not needed
-            else f"change {' or '.join(f'`{name}`' for name in idleness[0])}",
+            else f"change {' or '.join(f'`{name}`' for name in keys)}",
         )
 
 

@@ -64,9 +64,12 @@ def measure_of(unit: Unit) -> units.Measure:
     return measure
 
 
-def unit_of_plan(unit: Unit | None) -> Unit | None:
-    """The unit in which a plan may show a value: the deck's; None, for SI, where the deck declares a part of it."""
-    return None if unit is None or unit.declared else unit
+def unit_of_plan(unit: Unit | None, dimension: Dimension | None = None) -> Unit | None:
+    """The unit in which a plan may show a value: the deck's; None, for SI, where the deck declares a part of it, or it
+    is not of this dimension, if one is given."""
+    if unit is None or unit.declared or (dimension is not None and measure_of(unit).dimension != dimension):
+        return None
+    return unit
 
 
 def in_unit(value: Value, unit: Unit) -> Value:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import replace
-from types import MappingProxyType
+from types import MappingProxyType, SimpleNamespace
 from typing import Any
 
 from ic.grammar.syntax import Call, Expression, Name, String, place_of
@@ -19,6 +19,7 @@ from met.diagnostic import Label, Place, Problem, did_you_mean, error, leave_out
 from met.environments.environment import FILE, Environment
 from met.parameter import Only, Parameter, is_present
 from met.plan import Origin
+from met.trace import Scalar
 from met.unit_parser import parse_unit
 
 
@@ -233,6 +234,16 @@ def body_of(scope: Scope, item: Item | None) -> MergedBlock:
         )
         return MergedBlock()
     return item.body
+
+
+def idleness(model: Any, values: Mapping[str, Any], duration: float) -> tuple[Sequence[str], str] | None:
+    """The parameters by which a model has no effect in a run of this duration, s, and the reason in words; None where
+    it has one, or may have one in some case of a sweep. values: of all its parameters"""
+    numbers = [x for value in values.values() for x in (value if isinstance(value, tuple) else (value,))]
+    if model.idle is None or any(isinstance(x, Scalar) for x in numbers):
+        return None
+    found: tuple[Sequence[str], str] | None = model.idle(SimpleNamespace(**values), duration)
+    return found
 
 
 TIME = "time"
