@@ -11,7 +11,7 @@ from ic.robots.attributes import printable
 from ic.robots.entries import ArmEntries, spelled
 from ic.robots.robot import MOVING, Joint, Numbers, Robot
 from ic.robots.urdf import MOMENTS
-from ic.text.complaints import counted
+from ic.text.complaints import and_more, counted
 from met.diagnostic import Diagnostic, Label, Place
 
 MOST_NAMED = 8  # names, kinds of elements
@@ -47,11 +47,10 @@ def warnings_of(body: ArmEntries, named: Place) -> Iterator[Diagnostic]:
             Label(change.written.place, f"{change.kind} `{printable(change.written.text)}` is `{change.name}`")
             for change in changed[:MOST_NAMED]
         )
-        more = f", and {len(changed) - MOST_NAMED} more" if len(changed) > MOST_NAMED else ""
         what = f"{counted(len(changed), 'name')} of `{body.robot.file}`"
         yield Diagnostic(
             "D211",
-            f"{what} {'is' if len(changed) == 1 else 'are'} another in decks{more}",
+            f"{what} {'is' if len(changed) == 1 else 'are'} another in decks{and_more(len(changed) - MOST_NAMED)}",
             Label(named),
             also,
             ("a deck's names are letters, digits and `_`, each once",),

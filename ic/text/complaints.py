@@ -516,6 +516,11 @@ def counted(number: int, thing: str) -> str:
     return f"{number} {thing}{'s' * (number != 1)}"
 
 
+def and_more(others: int) -> str:
+    """A remark that the same is so of this many others, `, and 2 more`; "" of none."""
+    return f", and {others} more" if others > 0 else ""
+
+
 def with_article(word: str, *, quoted: bool = False) -> str:
     """A word with its article, `an arm`, `a servo`; quoted: in the quotes of deck text"""
     return f"{'an' if word[:1] in tuple('aeiou') else 'a'} {f'`{word}`' if quoted else word}"

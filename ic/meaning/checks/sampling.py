@@ -19,6 +19,7 @@ import numpy as np
 
 from ic.meaning.control.schedule import evaluate_declared
 from ic.meaning.parameters.scope import Scope
+from ic.text.complaints import and_more
 from met import models
 from met.content import Content, Hump, humps_from_zero, humps_of_turns
 from met.diagnostic import Place
@@ -288,10 +289,9 @@ def _remark(scope: Scope, sampled: SampledContent, contents: list[Content], sche
         times = f"{before * sampled.interval:.9g} s and {(before + 1) * sampled.interval:.9g} s"
         enough = _fitting(1.0 / (ends - begins), base) if ends > begins else math.inf
         rate = [f"or give what sees it {_written(enough, base)}"] if enough < math.inf else []
-        others = f", and {len(lost) - 1} more" if len(lost) > 1 else ""
         scope.complaints.remark(
             "D336",
-            f"{sampled.label} has a pulse that is not seen{others}: it is beyond half of its height "
+            f"{sampled.label} has a pulse that is not seen{and_more(len(lost) - 1)}: it is beyond half of its height "
             f"from {begins:.9g} s to {ends:.9g} s, and {sampled.by} at {times}",
             place,
             help=[f"let it last longer than {sampled.interval:.6g} s", *rate],
@@ -304,13 +304,12 @@ def _remark(scope: Scope, sampled: SampledContent, contents: list[Content], sche
     ]
     if off:
         points, worst = max(off, key=lambda pair: pair[1].off)
-        others = f", and {len(off) - 1} more" if len(off) > 1 else ""
         what = "integral" if sampled.integral else "peak"
         scope.complaints.remark(
             "D342",
-            f"{sampled.label} has a pulse that is seen as another{others}: from {worst.begins:.9g} s to "
-            f"{worst.ends:.9g} s its {what} is {worst.truth:.4g}, and {sampled.by} every {sampled.interval:.6g} s make "
-            f"it {worst.seen:.4g}, {100.0 * worst.off:.3g} % {'more' if worst.seen > worst.truth else 'less'}",
+            f"{sampled.label} has a pulse that is seen as another{and_more(len(off) - 1)}: from {worst.begins:.9g} s "
+            f"to {worst.ends:.9g} s its {what} is {worst.truth:.4g}, and {sampled.by} every {sampled.interval:.6g} s "
+            f"make it {worst.seen:.4g}, {100.0 * worst.off:.3g} % {'more' if worst.seen > worst.truth else 'less'}",
             place,
             help=[
                 "let it begin, turn and end at instants that see it, or last longer",

@@ -16,7 +16,7 @@ from typing import Final, TypeGuard
 
 from ic.grammar.syntax import Call, Expression, Name, String, Word
 from ic.meaning.definitions.csv_files import WORD, CsvCell, CsvColumn, CsvTable, missing_column
-from ic.text.complaints import known_words
+from ic.text.complaints import and_more, known_words
 from met.diagnostic import Diagnostic, Label, Place, Problem, did_you_mean, error
 from met.frozen import frozen
 
@@ -52,7 +52,7 @@ class RowTable:
         if not others:
             return None
         place = self.csv.cell(self.csv.columns[0], self.rows[others[0]]).place
-        message = f"nothing uses row `{others[0]}`" + (f", and {len(others) - 1} more" if len(others) > 1 else "")
+        message = f"nothing uses row `{others[0]}`{and_more(len(others) - 1)}"
         helps = [*([known_words("not used", others)] if len(others) > 1 else []), "leave `rows = all` out, or use them"]
         also = (Label(self.all_used, "all are to be used"),)
         return Diagnostic("D385", message, Label(place), also, tuple(helps), severity="warning")

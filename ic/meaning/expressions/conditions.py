@@ -10,7 +10,7 @@ import numpy as np
 
 from ic.grammar.syntax import Unit
 from ic.meaning.expressions.quantity import Value, measure_of
-from ic.text.complaints import PROVISIONAL, Complaints
+from ic.text.complaints import PROVISIONAL, Complaints, and_more
 from met.diagnostic import Diagnostic, Label, Place
 from met.frozen import frozen
 from met.plan.columns import AxisColumn, CaseValues, blocks, ends
@@ -261,11 +261,10 @@ class Checks:
             return
         self.fail(check.path)
         where = ", ".join(f"{path} = {self.value_words(path, cases[path][row])}" for path in cases)
-        more = f", and {count - 1} more" if count > 1 else ""
         case = self._case(row)
         self.complaints.error(
             check.code,
-            f"{check.message}; {case} breaks it{more}",
+            f"{check.message}; {case} breaks it{and_more(count - 1)}",
             Label(check.place, causes[0] if causes else ""),
             help=(f"{case}: {where}", *(self._narrower(check) or check.help)),
         )
