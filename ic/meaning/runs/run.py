@@ -11,7 +11,6 @@ from typing import Any
 from ic.grammar.syntax import Call, Name, Word
 from ic.language.runs import DURATION, ENVIRONMENT, INITIAL, RATES, RUN, SEED, TOLERANCES
 from ic.meaning.control.guides import name_guides, resolve_guides
-from ic.meaning.control.schedule import Rate
 from ic.meaning.control.sensors import resolve_link_sensors
 from ic.meaning.control.servos import resolve_servos
 from ic.meaning.control.substitution import resolve_substitutions
@@ -39,7 +38,7 @@ from ic.text.complaints import known_words, where_it_belongs
 from met.diagnostic import Place, did_you_mean, write
 from met.frozen import frozen
 from met.integrators import DEFAULT_INTEGRATOR
-from met.plan import Allowance, Cases, Experiment, Schedule, ServoUse, Structure
+from met.plan import Allowance, Cases, Experiment, Schedule, Structure
 from met.plan.judged import LinearUse, MetricUse, Requirement, StepErrorLimit, Tolerance
 from met.trace import Formulas
 
@@ -106,16 +105,11 @@ def resolve_run(scope: Scope, definition: Definition) -> Resolved | None:
     schedule, ticks, others = resolve_schedule(scope, run, block, rates, uses, [*guides, *sensors], duration)
     dynamics = rates.get("dynamics") if integrator is not None else None
     integrator = integrator or DEFAULT_INTEGRATOR
-    _keep_settings(scope, block, arm, integrator, rates, schedule)
+    _keep_settings(scope, block, arm, integrator, schedule)
     servos = tuple(
-        ServoUse(
-            joint=use.joint,
-            definition=use.definition,
-            model=use.servo.name,
-            command=use.command,
+        replace(
+            use.bare,
             divisor=ticks[use.joint].divisor,
-            place=use.place,
-            words=use.words,
             continuous=ticks[use.joint].continuous,
             sensors=use.sensors,
         )
@@ -162,9 +156,7 @@ def resolve_run(scope: Scope, definition: Definition) -> Resolved | None:
     )
 
 
-def _keep_settings(
-    scope: Scope, block: MergedBlock, arm: ResolvedArm, integrator: Any, rates: Mapping[str, Rate], schedule: Schedule
-) -> None:
+def _keep_settings(scope: Scope, block: MergedBlock, arm: ResolvedArm, integrator: Any, schedule: Schedule) -> None:
     """Keep a run's settings for `met explain`, besides those kept by `Scope.constant` and `Scope.word`."""
     scope.keep_setting("arm", arm.name, item=block.get("arm"))
     scope.keep_setting("integrator", integrator.name, item=block.get("integrator"))
