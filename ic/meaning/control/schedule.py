@@ -74,7 +74,8 @@ def fixed_rate(
     continuous: bool = False,
     doc: str = RATE.doc,
 ) -> Rate | None:
-    """A rate in Hz, which no sweep can vary; `CONTINUOUS` Hz where it may be `continuous`, and is."""
+    """The rate of an entry, Hz, which no sweep can vary; `CONTINUOUS` where it may be `continuous`, and is; None where
+    it has a mistake, which is reported."""
     if word_of(item.value) == "continuous" and not isinstance(item.value, Call):
         if item.upon is not None:
             scope.complaints.add(no_block(item.name, item.upon, item.place))
@@ -85,8 +86,8 @@ def fixed_rate(
         scope.complaints.error("D106", message, item.value_place, help="write a rate in Hz")
         return None
     wanted = replace(RATE, name=name, doc=doc)
-    hz = scope.constant(owner, wanted, item)
-    return Rate(label, hz, item.value_place) if hz is not None and SLOWEST <= hz <= FASTEST else None
+    rate = scope.constant(owner, wanted, item)
+    return Rate(label, rate, item.value_place) if rate is not None and SLOWEST <= rate <= FASTEST else None
 
 
 def exact(value: float) -> Fraction:
