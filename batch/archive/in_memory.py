@@ -100,7 +100,7 @@ class DatasetMaker:
             "schema": archive_layout.SCHEMA,
             "schema_version": archive_layout.VERSION,
             "deck": self._deck,
-            **{name: value for name, value in layout.attributes.items() if name != "coordinates"},
+            **_as_opened(layout.attributes),
             "cases_in_table": count,
             "code_key": prepared.code_key,
         }
@@ -182,10 +182,10 @@ def _as_read(attributes: Mapping[str, Any]) -> dict[str, Any]:
 def _as_opened(attributes: Mapping[str, Any]) -> dict[str, Any]:
     """Attributes as xarray gives them for an opened archive: those of coordinates are left out, and a list of one item
     is that item."""
-    plain = {name: value for name, value in attributes.items() if name != "coordinates"}
     return {
         name: value[0] if isinstance(value, list | np.ndarray) and len(value) == 1 else value
-        for name, value in plain.items()
+        for name, value in attributes.items()
+        if name != "coordinates"
     }
 
 

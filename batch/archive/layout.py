@@ -26,7 +26,6 @@ still says what its cases are (`q.where(q["recorded.gearbox.kp"] > 0.02, drop=Tr
 
 from __future__ import annotations
 
-import math
 import re
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import field, replace
@@ -162,7 +161,7 @@ class Layout:
     def bytes(self) -> int:
         """Approximate size of the group in the file."""
         values = sum(int(np.prod(self.shape(v), dtype=np.int64)) * WIDTHS[v.kind] for v in self.variables)
-        chunks = sum(self.sizes["recorded_case"] for _ in self.role("signal"))
+        chunks = len(self.role("signal")) * self.sizes.get("recorded_case", 0)
         return values + CHUNK_ENTRY * chunks + VARIABLE_HEAD * len(self.variables)
 
     def chunks(self, variable: Variable) -> tuple[int, ...] | None:
@@ -355,11 +354,8 @@ def _over_cases(experiment: Experiment) -> dict[str, np.ndarray]:
     if all(requirement.share is None for requirement in requirements):
         return {}
     return {
-        name: np.array([math.nan if value is None else value for value in values])
-        for name, values in (
-            ("share", [requirement.share for requirement in requirements]),
-            ("confidence", [requirement.confidence for requirement in requirements]),
-        )
+        name: np.array([getattr(requirement, name) for requirement in requirements], float)  # None is not-a-number
+        for name in ("share", "confidence")
     }
 
 
@@ -436,13 +432,15 @@ def _attributes(experiment: Experiment, variables: list[Variable]) -> dict[str, 
     allowances."""
     from met.plan import keys
 
-    structure, schedule = experiment.structure, experiment.structure.schedule
+    structure, schedule, search = experiment.structure, experiment.structure.schedule, experiment.search
     named = ("coordinate", "choice", "recorded")
     coordinates = ["case_id", "case_key", *(v.name for v in variables if v.role in named)]
     if experiment.cases.repeats is not None:
         coordinates.append("repeat")
-    if experiment.search is not None:
+    if search is not None:
         coordinates.append(searched.GENERATION)
+    metrics = {variable.key: variable.name for variable in variables if variable.role == "metric"}
+    errors = {verified.ATTRIBUTE: verified.written(experiment.step_errors, metrics)} if experiment.step_errors else {}
     return {
         "experiment": experiment.name,
         **({"sweep": experiment.sweep} if experiment.sweep else {}),
@@ -455,28 +453,12 @@ def _attributes(experiment: Experiment, variables: list[Variable]) -> dict[str, 
         "duration_s": schedule.duration,
         "structure_key": keys.structure_key(structure, keys.inputs(experiment)),
         "cases_in_table": experiment.cases.count,
-        **_step_errors(experiment, variables),
-        **_search(experiment, variables),
+        **errors,
+        **({} if search is None else searched.attributes(search, metrics[search.metric])),
         "frame": FRAME if structure.base is None else WHERE_IT_MOVES,
         "coordinates": " ".join(coordinates),
         **({"allowed": "\n".join(map(str, experiment.allowances))} if experiment.allowances else {}),
     }
-
-
-def _step_errors(experiment: Experiment, variables: list[Variable]) -> dict[str, str]:
-    """The attribute of requirements on errors by the step; none where there are none."""
-    if not experiment.step_errors:
-        return {}
-    names = {variable.key: variable.name for variable in variables if variable.role == "metric"}
-    return {verified.ATTRIBUTE: verified.written(experiment.step_errors, names)}
-
-
-def _search(experiment: Experiment, variables: list[Variable]) -> dict[str, Any]:
-    """The attributes of a search; none for other experiments."""
-    if experiment.search is None:
-        return {}
-    names = {variable.key: variable.name for variable in variables if variable.role == "metric"}
-    return searched.attributes(experiment.search, names[experiment.search.metric])
 
 
 def group_names(plan: Plan) -> tuple[str, ...]:

@@ -105,7 +105,7 @@ def _dataset(node: Any) -> str:
     if creation.get_external_count():
         return "has its values in another file (external storage)"
     own = (module.h5z.FILTER_DEFLATE, module.h5z.FILTER_SHUFFLE, module.h5z.FILTER_FLETCHER32)
-    for code in (creation.get_filter(number)[0] for number in range(creation.get_nfilters())):
+    for code in _packers(node):
         if code not in own:
             return f"is packed by other people's code (HDF5's filter {code})"
     kind = node.get_type()

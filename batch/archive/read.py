@@ -93,10 +93,7 @@ class ArchiveGroup:
     def values(self, name: str) -> np.ndarray:
         """All of a variable; strings as an array of str."""
         with reading(self.path):
-            dataset = self._node[name]
-            if h5py().check_string_dtype(dataset.dtype) is not None:
-                return np.asarray(dataset.asstr()[...], dtype=object)
-            return np.asarray(dataset[...])
+            return np.asarray(_decoding(self._node[name])[...])
 
     def at(self, name: str, positions: Sequence[int] | np.ndarray) -> np.ndarray:
         """A variable in the cases at these positions, in their order; if they are few of many, each is read alone."""
@@ -104,17 +101,14 @@ class ArchiveGroup:
             return self.values(name)[positions]
         with reading(self.path):
             dataset = self._node[name]
-            words = h5py().check_string_dtype(dataset.dtype) is not None
-            read = dataset.asstr() if words else dataset
-            return np.array([read[int(position)] for position in positions], dtype=object if words else dataset.dtype)
+            read = _decoding(dataset)
+            kind = dataset.dtype if read is dataset else object
+            return np.array([read[int(position)] for position in positions], dtype=kind)
 
     def stretch(self, name: str, first: int, last: int) -> np.ndarray:
         """A variable in the cases at positions `first` to `last` (exclusive); strings as an array of str."""
         with reading(self.path):
-            dataset = self._node[name]
-            if h5py().check_string_dtype(dataset.dtype) is not None:
-                return np.asarray(dataset.asstr()[first:last], dtype=object)
-            return np.asarray(dataset[first:last])
+            return np.asarray(_decoding(self._node[name])[first:last])
 
     def digests(self, name: str, first: int, last: int) -> np.ndarray:
         """Digests of some cases as whole numbers of 64 bits."""
@@ -431,6 +425,11 @@ def _stored(name: str, node: Any) -> Stored:
         str(attributes.pop("long_name", "")),
         attributes,
     )
+
+
+def _decoding(dataset: Any) -> Any:
+    """A dataset to read values from: one of strings gives them as an array of str."""
+    return dataset if h5py().check_string_dtype(dataset.dtype) is None else dataset.asstr()
 
 
 INTERNAL = frozenset({"DIMENSION_LIST", "REFERENCE_LIST", "CLASS", "NAME", "_Netcdf4Dimid", "_Netcdf4Coordinates"})

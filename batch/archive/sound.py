@@ -135,10 +135,9 @@ def _attributes(attributes: dict[str, Any]) -> None:
 
 def _of_its_role(variable: Stored, types: dict[str, str]) -> None:
     """Check that a variable's type and dimensions match its role. types: of all variables, in numpy's notation"""
-    kinds = {name: dtype[1] for name, dtype in types.items()}
     name, dims = variable.name, variable.dims
     wanted = OF_ROLES.get(variable.role, NUMBERS + WORDS)
-    if kinds[name] not in wanted and types[name] not in wanted:
+    if types[name][1] not in wanted and types[name] not in wanted:
         raise Unlike(f"variable `{name}` is of another type")
     of_cases = ("coordinate", "metric", "choice", "limit", "excess", "extreme", "grapple", "case")
     if variable.role in of_cases and dims != ("case",):
@@ -148,7 +147,7 @@ def _of_its_role(variable: Stored, types: dict[str, str]) -> None:
             raise Unlike(f"variable `{name}` is not over cases and time")
         if len(dims) > (4 if variable.of_joints else 3):
             raise Unlike(f"variable `{name}` has more dimensions than joints and components")
-        if any(kinds[dim] not in WORDS for dim in dims[2:]):
+        if any(types[dim][1] not in WORDS for dim in dims[2:]):
             raise Unlike(f"variable `{name}` has a dimension without names")
     scale = variable.attributes.get("deck_scale", 1.0)
     if not isinstance(scale, int | float) or not math.isfinite(scale) or not scale:

@@ -28,6 +28,7 @@ from met.plan import Experiment, Plan, recipes
 from met.plan import file as plan_file
 from met.plan.columns import LISTED_ROWS, CaseValues, blocks
 from met.plan.uses import packages
+from met.version import VERSION
 
 if TYPE_CHECKING:
     from met.run import Run
@@ -193,7 +194,7 @@ class ArchiveWriter:
         """Write the deck, the plan and the versions that made the numbers."""
         group = self._file.create_group("provenance", track_order=True)
         commit, changed = self._revision.read()
-        versions = {"met": _met_version(), **backends.find().libraries(), "numpy": np.__version__}
+        versions = {"met": VERSION, **backends.find().libraries(), "numpy": np.__version__}
         versions |= {name: version(name) for name in packages(e.structure for e in self.plan.experiments)}
         about = {f"version_{name}": value for name, value in versions.items()}
         put_attributes(
@@ -291,9 +292,3 @@ def _make(group: Any, layout: Layout, variable: Variable) -> Any:
 def _text(text: str) -> str:
     """A text without null characters, which would end HDF5's strings; decks normally have none."""
     return text.replace("\0", "\N{REPLACEMENT CHARACTER}")
-
-
-def _met_version() -> str:
-    from met.version import VERSION
-
-    return VERSION
