@@ -49,12 +49,18 @@ def values_of_cases(experiment: Experiment, layout: Layout, run: Run, id_head: b
         values |= {variable.name: values[variable.key] for variable in layout.role(role)}
     for choice, variable in zip(experiment.cases.choices, layout.role("choice"), strict=True):
         values[variable.name] = [choice.value] * len(rows)
-    met = np.empty((len(rows), len(experiment.requirements)), np.int8)
+    values["met"] = verdicts_of_cases(experiment, run)
+    return values
+
+
+def verdicts_of_cases(experiment: Experiment, run: Run) -> np.ndarray:
+    """1 where a case meets a requirement, 0 where it misses it, -1 where that is unknown since it failed or has no
+    value of the metric, [case, requirement]."""
+    verdicts = np.empty((len(run.case), len(experiment.requirements)), np.int8)
     for index, requirement in enumerate(experiment.requirements):
         unknown = (run.status != 0) | np.isnan(run.metrics[requirement.metric])
-        met[:, index] = np.where(unknown, -1, run.met[requirement.text])
-    values["met"] = met
-    return values
+        verdicts[:, index] = np.where(unknown, -1, run.met[requirement.text])
+    return verdicts
 
 
 def values_of_dimensions(experiment: Experiment) -> dict[str, Any]:

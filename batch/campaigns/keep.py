@@ -14,6 +14,7 @@ import numpy as np
 
 from batch.archive import layout as archive_layout
 from batch.archive.summarised import CaseSummary
+from batch.archive.values import verdicts_of_cases
 from batch.campaigns.outcomes import CaseOutcomes
 from batch.campaigns.tasks import CampaignSection
 from batch.campaigns.verification import verifying
@@ -23,7 +24,7 @@ from met.distinct import distinct
 from met.frozen import frozen
 from met.plan import Coordinate, Experiment
 from met.plan.columns import CaseValues, are_among, blocks, places_among, span
-from met.run import DONE, Run
+from met.run import Run
 
 SINGLE = ("default", "all", "none", "every", "failed", "worst")
 WORDS = "default, all, none, every:N, failed, worst:N, worst:N:METRIC, or cases by '#7' or id"
@@ -248,10 +249,6 @@ def summarise(
     for first, run in runs:
         outcomes.add_run(run)
         rows = np.asarray(run.case)
-        met = np.empty((len(rows), len(experiment.requirements)), np.int8)
-        for number, requirement in enumerate(experiment.requirements):
-            unknown = (run.status != DONE) | np.isnan(run.metrics[requirement.metric])
-            met[:, number] = np.where(unknown, -1, run.met[requirement.text])
         tallies.add(
             CaseBlock(
                 first + np.arange(len(rows)),
@@ -259,7 +256,7 @@ def summarise(
                 run.cause,
                 run.warning,
                 run.metrics,
-                met,
+                verdicts_of_cases(experiment, run),
                 points.of([np.asarray(coordinate.values[rows]) for coordinate in chosen], len(rows)),
                 int(np.count_nonzero(run.limited)),
             )
