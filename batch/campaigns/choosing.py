@@ -97,8 +97,9 @@ def select_rows(
         if len(matches) > 1 and not _is_row(case):
             some = ", ".join(f"#{e.cases.table[row]} of `{e.name_in_deck}`" for e, row in matches[:4])
             message = f"case `{case}` may be any of {len(matches)}: {some}"
-            position, alike = matches[0][0].cases.table[matches[0][1]], len({_id_of(*match) for match in matches}) == 1
-            remedy = "" if alike else "give more of its id, or "  # cases that differ only in structure share their ids
+            position = matches[0][0].cases.table[matches[0][1]]
+            ids = {keys.case_ids(e, [row])[0] for e, row in matches}  # cases that differ only in structure share theirs
+            remedy = "" if len(ids) == 1 else "give more of its id, or "
             raise Problem(error("E312", message, help=f"{remedy or 'give '}its position: `--case '#{position}'`"))
         for experiment, row in matches:
             rows_of[experiment.name].add(row)
@@ -109,10 +110,6 @@ def _of_search(name: str, case: int | str) -> str:
     """Remedies where a case may belong to a search that has not run yet."""
     again = f"`met run ARCHIVE.h5 --case {quoted(_case_text(case))}`"
     return f"each case of the search `{name}` follows from those before: run one again from its archive: {again}"
-
-
-def _id_of(experiment: Experiment, row: int) -> str:
-    return keys.case_ids(experiment, [row])[0]
 
 
 def _is_row(case: int | str) -> bool:

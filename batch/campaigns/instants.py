@@ -221,11 +221,10 @@ def _place(experiment: Experiment, follower: Unfollowed) -> Place | None:
     """The place where the command, or the guide, is written."""
     if follower.kind == "path":
         return next(use.place for use in experiment.structure.guides if use.name == follower.subject)
-    commands = (
-        parameter
+    places = [
+        parameter.origin.place
         for path, parameter in experiment.parameters.items()
-        if path.startswith(f"{follower.subject}.servo.command.")
-    )
-    places = [command.origin.place for command in commands if command.origin.place is not None]
+        if path.startswith(f"{follower.subject}.servo.command.") and parameter.origin.place is not None
+    ]
     servos = [use.place for use in experiment.structure.servos if use.joint == follower.subject]
     return (places or servos)[0]

@@ -147,11 +147,8 @@ def report(folder: Folder, now: float) -> dict[str, Any]:
         )
     workers = []
     for status_record in status_records(folder):
-        rate = None
         done = status_record["section_done"] - status_record["at_first"]
         seconds = status_record["updated"] - status_record["section_began"]
-        if done > 0 and seconds > 0:
-            rate = done / seconds
         workers.append(
             {
                 "job": status_record["name"],
@@ -165,7 +162,7 @@ def report(folder: Folder, now: float) -> dict[str, Any]:
                 "done": status_record["section_done"],
                 "failed": status_record["failed"],
                 "more": status_record["more"] if isinstance(status_record.get("more"), str) else "",
-                "cases_per_s": rate,
+                "cases_per_s": done / seconds if done > 0 and seconds > 0 else None,
                 "seconds_ago": max(0.0, now - status_record["updated"]),
             }
         )

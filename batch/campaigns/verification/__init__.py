@@ -1,5 +1,5 @@
 """Solution verification: some of a campaign's cases again, with the dynamics at half and a quarter of the step.
 
-The method is that of NASA-STD-7009. `when` decides whether to verify, `choosing` chooses the cases, and `verifying`
-runs them; `batch/archive/verified.py` stores the results, and `batch/queries/step_errors` computes errors from them.
+The method is that of NASA-STD-7009. `verifying` decides whether to verify, chooses the cases and runs them;
+`batch/archive/verified.py` stores the results, and `batch/queries/step_errors` computes errors from them.
 """

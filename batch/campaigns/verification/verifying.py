@@ -6,7 +6,7 @@ import hashlib
 from collections.abc import Callable, Iterable
 from dataclasses import replace
 from functools import partial
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 
@@ -82,9 +82,9 @@ def resolve(wanted: Verify, prepared: Prepared, cases: int) -> Verify:
         return wanted
     if experiment.step_errors:
         return "some"
-    steps = _steps(experiment)
+    steps = experiment.structure.schedule.ticks // experiment.structure.schedule.dynamics
     if cases == 1:
-        size = _operations(prepared)
+        size = sum(len(section.nodes) for section in prepared.recording.sections)
         short = size <= SHORT_PROGRAM and size * steps * sum(FACTORS) <= SHORT_OPERATIONS
         return "some" if short else "none"
     added = most(metrics, cases) * sum(FACTORS) * steps + len(FACTORS) * PREPARING
@@ -96,15 +96,6 @@ def settled(wanted: Verify, sections: Iterable[tuple[Prepared, int]]) -> Verify:
     equal however the choice was written."""
     same = all(resolve(wanted, *section) == resolve("auto", *section) for section in sections)
     return "auto" if same else wanted
-
-
-def _steps(experiment: Experiment) -> int:
-    schedule = experiment.structure.schedule
-    return schedule.ticks // schedule.dynamics
-
-
-def _operations(prepared: Any) -> int:
-    return sum(len(section.nodes) for section in prepared.recording.sections)
 
 
 FACTORS = (2, 4)
