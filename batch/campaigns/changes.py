@@ -5,12 +5,13 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
+from ic.printing.columns import count
 from met.diagnostic import Place
 from met.frozen import frozen
 from met.plan import BASE, Base, Cases, Command, Course, Experiment, Formula, Plan, Quantity, Schedule, Structure
@@ -75,10 +76,25 @@ def between(before: Experiment, now: Experiment, *, ordered: bool) -> list[Chang
 def _linear(before: Experiment, now: Experiment) -> Iterator[str]:
     """Changes of linear answers, and of metrics of them."""
     for word, texts_of in (("linear", _answers), ("metric", _figures)):
-        old, new = texts_of(before), texts_of(now)
-        for name in dict.fromkeys((*old, *new)):
-            if old.get(name) != new.get(name):
-                yield f"{word} {name}: {old.get(name, 'none')} -> {new.get(name, 'none')}"
+        for name, change in _changed_words(texts_of(before), texts_of(now)):
+            yield f"{word} {name}: {change}"
+
+
+def _changed_words(before: Mapping[str, str], now: Mapping[str, str]) -> Iterator[tuple[str, str]]:
+    """The names that have another word now, with both words, `none` where it has none: `friction`, `none -> lugre`."""
+    for name in dict.fromkeys([*before, *now]):
+        words = [word_of.get(name, "none") for word_of in (before, now)]
+        if words[0] != words[1]:
+            yield name, " -> ".join(words)
+
+
+def _changed_entries(
+    before: Mapping[str, Any], now: Mapping[str, Any], *, new: str, gone: str, other: str
+) -> Iterator[str]:
+    """A line for each name that is new, gone, or has another value: the name, followed by what is said of these."""
+    for name in dict.fromkeys([*before, *now]):
+        if before.get(name) != now.get(name):
+            yield name + (gone if name not in now else new if name not in before else other)
 
 
 def _answers(experiment: Experiment) -> dict[str, str]:
@@ -248,7 +264,7 @@ def _cases(before: Cases, now: Cases, ordered: bool) -> Iterator[str]:
     change"""
     old, new = ({c.path: c for c in cases.coordinates} for cases in (before, now))
     if before.count != now.count:
-        yield f"{_count(before)} -> {_count(now)}"
+        yield f"{count(before.count, 'case')} -> {count(now.count, 'case')}"
     for path in dict.fromkeys([*old, *new]):
         if path not in old:
             yield f"{path} is varied now: {_span(new[path])}"
@@ -279,13 +295,13 @@ def _stops(before: Experiment, now: Experiment) -> Iterator[str]:
             }
             for run in (before, now)
         )
-        for text in dict.fromkeys([*old, *new]):
-            if text not in new:
-                yield f"{text} is not to be shown any more"
-            elif text not in old:
-                yield f"{text} is to be shown now"
-            elif old[text] != new[text]:
-                yield f"{text}: with another limit, share or confidence"
+        yield from _changed_entries(
+            old,
+            new,
+            new=" is to be shown now",
+            gone=" is not to be shown any more",
+            other=": with another limit, share or confidence",
+        )
 
 
 def _searches(before: Search, now: Search) -> Iterator[str]:
@@ -293,13 +309,9 @@ def _searches(before: Search, now: Search) -> Iterator[str]:
     if before.goal != now.goal:
         yield f"goal: {before.goal} -> {now.goal}"
     old, new = ({parameter.path: parameter for parameter in search.parameters} for search in (before, now))
-    for path in dict.fromkeys([*old, *new]):
-        if path not in new:
-            yield f"{path} is not chosen any more"
-        elif path not in old:
-            yield f"{path} is chosen now"
-        elif old[path] != new[path]:
-            yield f"{path} is chosen between other ends"
+    yield from _changed_entries(
+        old, new, new=" is chosen now", gone=" is not chosen any more", other=" is chosen between other ends"
+    )
     if before.against != now.against:
         yield f"against: {before.against or 'nothing'} -> {now.against or 'nothing'}"
     elif before.plants != now.plants:
@@ -332,10 +344,6 @@ def _alike(first: CaseValues, two: CaseValues) -> bool:
     return len(first) == len(two) and all(
         np.array_equal(first[rows], two[rows], equal_nan=True) for rows in blocks(len(first))
     )
-
-
-def _count(cases: Cases) -> str:
-    return f"{cases.count:,} case{'s' if cases.count != 1 else ''}"
 
 
 def _span(coordinate: Any) -> str:
@@ -418,16 +426,14 @@ def _base(before: Base | None, now: Base | None) -> Iterator[tuple[str, str]]:
         yield f"initial.{BASE}.", f"base: {kinds[0]} -> {kinds[1]}"
         yield from ((path, "") for path in (f"{BASE}.", f"links.{BASE}."))
     elif before is not None and now is not None:
-        yield from _courses("base", "base.", before.courses, now.courses)
+        for component, change in _courses(before.courses, now.courses):
+            yield f"base.{component}.", f"base: {component} {change}"
 
 
-def _courses(what: str, path: str, before: Sequence[Course], now: Sequence[Course]) -> Iterator[tuple[str, str]]:
-    """Changes of the commands' models that move components in time, each with the prefix of their paths."""
+def _courses(before: Sequence[Course], now: Sequence[Course]) -> Iterator[tuple[str, str]]:
+    """The components whose motion in time is another command's model now, with both models."""
     old, new = ({course.component: course.model for course in courses} for courses in (before, now))
-    for component in dict.fromkeys([*old, *new]):
-        models = [models_of.get(component, "none") for models_of in (old, new)]
-        if models[0] != models[1]:
-            yield f"{path}{component}.", f"{what}: {component} {models[0]} -> {models[1]}"
+    return _changed_words(old, new)
 
 
 def _entities(field: str, before: Structure, now: Structure) -> Iterator[tuple[str, str]]:
@@ -462,9 +468,11 @@ def _thing(field: str, old: Any, new: Any, before: Structure, now: Structure) ->
         elif isinstance(old_value, Formulas):
             yield field_.name, f"{old.text} -> {new.text}" if old.text != new.text else "computed otherwise"
         elif field_.name == "courses":
-            yield from (("courses", text.removeprefix(": ")) for _, text in _courses("", "", old_value, two))
+            yield from (("courses", f"{component} {change}") for component, change in _courses(old_value, two))
         elif field == "servos" and field_.name == "sensors":
-            yield from (("sensors", text) for text in _sensors(old_value, two))
+            old_models, models = ({sensor.of: sensor.model for sensor in sensors} for sensors in (old_value, two))
+            for source, change in _changed_words(old_models, models):
+                yield "sensors", f"sensor of {source} {change}"
         elif field == "record" and field_.name == "joints":
             if {joint.name for joint in before.moving} == {joint.name for joint in now.moving}:
                 yield field_.name, f"of {_word(old_value)} -> of {_word(two)}"
@@ -476,15 +484,6 @@ def _with_dynamics(divisor: int | None, two: int | None, before: Structure, now:
     """True if a part ticked once a step of the dynamics and still does: the dynamics' own change then covers its
     rate."""
     return divisor == before.schedule.dynamics and two == now.schedule.dynamics
-
-
-def _sensors(before: Sequence[Any], now: Sequence[Any]) -> Iterator[str]:
-    """Changes of the models of a servo's sensors, in words."""
-    old, new = ({sensor.of: sensor.model for sensor in sensors} for sensors in (before, now))
-    for source in dict.fromkeys([*old, *new]):
-        models = [models_of.get(source, "none") for models_of in (old, new)]
-        if models[0] != models[1]:
-            yield f"sensor of {source} {models[0]} -> {models[1]}"
 
 
 def _rate(divisor: int | None, schedule: Schedule) -> str:
