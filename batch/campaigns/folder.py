@@ -330,9 +330,20 @@ class Folder:
         """The tasks of a section whose shards count, and messages about those that do not, which are removed: their
         cases are run again."""
         tasks: dict[Task, Done] = {}
-        messages = []
+        messages: list[str] = []
         end = 0
-        for task in self.named_tasks(section.number):
+        for task, read_shard in self.sound_shards(section, messages):
+            tasks[task] = Done(read_shard.seconds, read_shard.failed_from(end - task.first))  # each case counts once
+            end = max(end, task.last)
+        return tasks, messages
+
+    def sound_shards(
+        self, section: CampaignSection, messages: list[str], stretch: tuple[int, int] | None = None
+    ) -> Iterator[tuple[Task, Shard]]:
+        """The tasks of a section, or those within a stretch of its cases, whose shards (files of results) count, with
+        these, by their first cases. The others are removed, so that their cases are run again, and told in
+        `messages`."""
+        for task in self.named_tasks(section.number, stretch):
             try:
                 read_shard = self.read(section, task)
             except (UnsoundShard, OSError) as reason:
@@ -340,15 +351,7 @@ class Folder:
                 messages.append(f"shard {task.name} {why}; its {task.cases:,} cases are run again")
                 _remove(self._path(task))
             else:
-                tasks[task] = Done(
-                    read_shard.seconds, read_shard.failed_from(end - task.first)
-                )  # each case counts once
-                end = max(end, task.last)
-        return tasks, messages
-
-    def remove_shard(self, task: Task) -> None:
-        """Remove a task's shard, sound or not: its cases are run again."""
-        _remove(self._path(task))
+                yield task, read_shard
 
     def bytes(self) -> int:
         """The size of all existing shards."""

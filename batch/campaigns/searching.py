@@ -257,16 +257,8 @@ def _held(
 
     tell  whether what is found counts as done before, and what is no shard is told of
     """
-    count, shards = driver.counts[section.number], list[tuple[Task, tasks.Shard]]()
-    for task in driver.folder.named_tasks(section.number, (first, last)):
-        try:
-            shards.append((task, driver.folder.read(section, task)))
-        except (tasks.UnsoundShard, OSError) as reason:
-            why = str(reason) if isinstance(reason, tasks.UnsoundShard) else f"cannot be read: {reason.strerror}"
-            driver.messages.append(f"shard {task.name} {why}; its {task.cases:,} cases are run again")
-            driver.folder.remove_shard(task)
-    end, new_shards = first, list[tuple[Task, tasks.Shard]]()
-    for task, held_shard in shards:
+    count, end, new_shards = driver.counts[section.number], first, list[tuple[Task, tasks.Shard]]()
+    for task, held_shard in driver.folder.sound_shards(section, driver.messages, (first, last)):
         if task.last > end:
             new_shards.append((task, held_shard))
             if tell:

@@ -95,8 +95,8 @@ def write_shard(path: Path, shard: Shard) -> None:
     with whole_file(path) as file:
         for part in parts:
             summed.update(part)
-            _put(file.fileno(), part)
-        _put(file.fileno(), summed.digest())
+            file.write(part)
+        file.write(summed.digest())
 
 
 def shard_of_file(path: Path, most: int | None = None) -> Shard:
@@ -155,12 +155,6 @@ def cannot_keep(folder: Path, reason: OSError) -> str:
 
 def _type(array: np.ndarray) -> str:
     return "f4" if array.dtype == np.float32 else "f8"
-
-
-def _put(file: int, data: bytes | memoryview) -> None:
-    left = memoryview(data)
-    while len(left):
-        left = left[os.write(file, left) :]
 
 
 GRANULE = 32
