@@ -21,8 +21,7 @@ from met.frozen import frozen
 if TYPE_CHECKING:
     import xarray
 
-    from batch.campaigns.drive import Progress
-    from batch.campaigns.executor import Executor
+    from batch.campaigns.drive import Executor, Progress
     from batch.campaigns.verification.verifying import Verify
     from batch.differences.result import Diff
     from batch.linearized import LinearAnswer

@@ -18,7 +18,7 @@ import numpy as np
 
 from batch.beds.case_result import CampaignRecords, CaseResult, case_result
 from batch.campaigns import tasks
-from batch.campaigns.executor import Outcome
+from batch.campaigns.drive import Outcome
 from batch.campaigns.folder import Folder
 from batch.campaigns.resuming import changed_since
 from batch.campaigns.tasks import CampaignSection, Done, Task

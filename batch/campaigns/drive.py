@@ -7,16 +7,61 @@ and in the end only one case is lost, `TRIES` times. Its status says so, and all
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from typing import Protocol
+from typing import Literal, Protocol
 
 from batch.campaigns import tasks
-from batch.campaigns.executor import Executor, Outcome
 from batch.campaigns.folder import Folder, uncovered
-from batch.campaigns.tasks import GRANULE, CampaignSection, Task
+from batch.campaigns.tasks import GRANULE, CampaignSection, Done, Task
+from met.frozen import frozen
 from met.run import LOST, TIMED_OUT
+
+
+@frozen
+class Outcome:
+    """The result of a task.
+
+    done      its shard is there
+    lost      what ran it died;  stalled: it made no progress for too long; the task may be tried again, or in parts
+    broken    nothing of the kind can be run: a full disk, a folder that a worker does not see
+    why       of the last three, in words
+    """
+
+    task: Task
+    kind: Literal["done", "lost", "stalled", "broken"]
+    done: Done | None = None
+    why: str = ""
+
+
+class Executor(Protocol):
+    """Carries out tasks, `workers` of them at a time."""
+
+    @property
+    def about(self) -> str:
+        """A description for people: `2 threads`."""
+
+    @property
+    def workers(self) -> int:
+        """Number of tasks that it runs at a time; more that are submitted wait. It may change."""
+
+    @property
+    def under_way(self) -> int:
+        """Number of finished cases of unfinished tasks."""
+
+    def open(self, folder: Folder, sections: Mapping[int, CampaignSection], tell: Callable[[], None]) -> None:
+        """Begin. tell: called now and then while `wait` waits. `sections` may grow"""
+
+    def submit(self, task: Task) -> None:
+        """Submit a task, to run after those submitted before."""
+
+    def wait(self) -> list[Outcome]:
+        """The outcomes since the last call; waits for at least one, unless none is submitted."""
+
+    def close(self) -> None:
+        """Stop at once. Tasks that are not done are forgotten."""
+
 
 WORK_SECONDS = 1.5
 """Intended duration of a task on its worker, s, where workers are few."""
@@ -110,7 +155,7 @@ class Driver:
 
     folder: Folder
     executor: Executor
-    progress: Progress | None = None
+    progress: Progress
     max_failures: int | None = None
     sections: int | None = None
     counts: dict[int, Count] = field(default_factory=dict)
@@ -140,14 +185,12 @@ class Driver:
     def telling(self, section: CampaignSection, cases: int) -> Iterator[None]:
         """Show the progress of a section with this number of cases during its work; 0 where their number is not
         known."""
-        if self.progress is not None:
-            count = self.counts[section.number]
-            self.progress.begin(section.name, cases, count.done, count.failed, self.executor.about)
+        count = self.counts[section.number]
+        self.progress.begin(section.name, cases, count.done, count.failed, self.executor.about)
         self._section_number = section.number
         yield
         self._section_number, self.more = None, ""
-        if self.progress is not None:
-            self.progress.end()
+        self.progress.end()
 
     def work(self, section: CampaignSection, missing: Sequence[tuple[int, int]], *, checked: bool = True) -> None:
         """Run cases of a section whose progress is shown. Raises Stopped.
@@ -158,7 +201,7 @@ class Driver:
 
     def tell(self) -> None:
         """Report the progress of the running section."""
-        if self.progress is not None and self._section_number is not None:
+        if self._section_number is not None:
             count = self.counts[self._section_number]
             self.progress.advance(count.done + self.executor.under_way, count.failed, self.more)
 

@@ -18,8 +18,7 @@ from batch.archive.sink import FileBusy as ArchiveBusy
 from batch.archive.sink import temporary_of
 from batch.campaigns import instants, merge, resuming
 from batch.campaigns.campaign import Campaign, histories_section, values_sections, with_known_rows
-from batch.campaigns.drive import Count, Driver, Progress, Stopped, TooManyFailures
-from batch.campaigns.executor import Executor
+from batch.campaigns.drive import Count, Driver, Executor, Progress, Stopped, TooManyFailures
 from batch.campaigns.folder import Folder, FolderBusy, beside, uncovered
 from batch.campaigns.keep import Summarised, summarise, worst_wanted
 from batch.campaigns.outcomes import CaseOutcomes, CountedCases
@@ -410,17 +409,15 @@ class _CampaignWork:
         way = verifying.resolve(self.campaign.verify, section.prepared, len(section.rows))
         if way == "none":
             return
-        from batch.campaigns.verification.verifying import FACTORS, chosen, verify
-
         experiment = self.whole.parts[number].experiment
         done = outcomes.done
-        places = done.select(np.arange(done.set)) if way == "all" else chosen(experiment, outcomes)
+        places = done.select(np.arange(done.set)) if way == "all" else verifying.chosen(experiment, outcomes)
         if len(places):
             own = {use.name for use in experiment.structure.metrics}
             named = writer.groups[number].layout.role("metric")
             names = {variable.key: variable.name for variable in named if variable.key in own}
-            self.reporter.begin(f"{section.name}, with shorter steps", len(FACTORS) * len(places), 0, 0, "")
-            verified = verify(
+            self.reporter.begin(f"{section.name}, with shorter steps", len(verifying.FACTORS) * len(places), 0, 0, "")
+            verified = verifying.verify(
                 experiment, section.rows[places], names, self._threads, lambda runs: self.reporter.advance(runs, 0)
             )
             writer.put_verified(number, verified)

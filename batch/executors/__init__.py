@@ -4,5 +4,5 @@
     processes   batch/executors/processes.py   a case that kills its process, or never ends, is found out
     dask        batch/executors/dask.py        many machines
 
-All give the same bits, and implement `batch.campaigns.executor.Executor`.
+All give the same bits, and implement `batch.campaigns.drive.Executor`.
 """

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from batch.campaigns.executor import Executor
+from batch.campaigns.drive import Executor
 from batch.executors.threads import Threads
 from met.diagnostic import Problem, error
 

@@ -21,7 +21,7 @@ from distributed.utils import sync
 from distributed.worker import WORKER_ANY_RUNNING
 
 from batch.campaigns import tasks
-from batch.campaigns.executor import Outcome
+from batch.campaigns.drive import Outcome
 from batch.campaigns.tasks import Task
 from batch.executors.child import Crew
 from met.version import VERSION

@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
 
 from batch.campaigns import tasks
-from batch.campaigns.executor import Outcome
+from batch.campaigns.drive import Outcome
 from batch.campaigns.folder import Folder
 from batch.campaigns.tasks import CampaignSection, Done, Task, cannot_keep
 from met.host import system

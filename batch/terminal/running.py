@@ -11,8 +11,7 @@ from pathlib import Path
 from batch.archive.read import ArchiveFile
 from batch.campaigns.campaign import Campaign, prepare
 from batch.campaigns.choosing import read_plan
-from batch.campaigns.drive import Progress
-from batch.campaigns.executor import Executor
+from batch.campaigns.drive import Executor, Progress
 from batch.campaigns.performing import Performed, TooMany, perform
 from batch.campaigns.rehearsal import rehearse
 from batch.campaigns.replaying import Replay, differences, in_both, replay

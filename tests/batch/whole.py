@@ -18,7 +18,7 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
-from batch.campaigns.executor import Executor, Outcome
+from batch.campaigns.drive import Executor, Outcome
 from batch.campaigns.folder import Folder, beside, uncovered
 from batch.campaigns.tasks import CampaignSection, Task
 from batch.executors.threads import Threads

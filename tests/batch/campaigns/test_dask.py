@@ -18,7 +18,7 @@ from distributed import Client, LocalCluster, Reschedule
 
 import batch
 from batch.campaigns.campaign import prepare, values_sections
-from batch.campaigns.executor import Outcome
+from batch.campaigns.drive import Outcome
 from batch.campaigns.folder import Folder, beside
 from batch.campaigns.tasks import CampaignSection, Task
 from batch.executors import dask as executor

@@ -21,7 +21,7 @@ import ic
 from batch.archive.read import ArchiveFile
 from batch.campaigns import merge, resuming, status, tasks
 from batch.campaigns.campaign import prepare
-from batch.campaigns.executor import Outcome
+from batch.campaigns.drive import Outcome
 from batch.campaigns.folder import Folder
 from batch.campaigns.replaying import differences
 from batch.executors import submitting
