@@ -122,17 +122,24 @@ def _locked(path: Path) -> int:
     while True:
         file = os.open(path, os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW, 0o666)
         try:
-            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            lock_at_once(file, fcntl.LOCK_EX)
         except BlockingIOError:
-            os.close(file)
             raise FileBusy from None
-        except OSError as reason:
-            if reason.errno not in (errno.ENOLCK, errno.ENOTSUP, errno.ENOSYS):  # a disk without locks: none is used
-                os.close(file)
-                raise
         if is_at(file, path):
             return file
         os.close(file)  # it was renamed or removed before it was locked
+
+
+def lock_at_once(file: int, kind: int) -> None:
+    """Lock an open file, by its descriptor, without waiting; a file that cannot be locked is closed. On a disk without
+    locks none is used. kind: fcntl.LOCK_EX, for one alone, or LOCK_SH. Raises BlockingIOError where it is locked by
+    another, OSError."""
+    try:
+        fcntl.flock(file, kind | fcntl.LOCK_NB)
+    except OSError as reason:
+        if reason.errno not in (errno.ENOLCK, errno.ENOTSUP, errno.ENOSYS):
+            os.close(file)
+            raise
 
 
 def is_at(file: int, path: Path) -> bool:

@@ -34,7 +34,7 @@ from typing import Any
 
 import numpy as np
 
-from batch.archive.sink import is_at
+from batch.archive.sink import is_at, lock_at_once
 from batch.campaigns.points import NPY_HEAD_BYTES, grown_program, points_path, read_points
 from batch.campaigns.tasks import CampaignSection, Done, Shard, Task, UnsoundShard, shard_of_file
 from batch.campaigns.verification.verifying import WORDS as VERIFY_WORDS
@@ -95,17 +95,13 @@ class Folder:
         do so `together`."""
         while self._lock < 0:
             self.path.mkdir(exist_ok=True)
-            self._lock = _lock_file(self.path / "lock")
+            file = _lock_file(self.path / "lock")
             try:
-                fcntl.flock(self._lock, (fcntl.LOCK_SH if together else fcntl.LOCK_EX) | fcntl.LOCK_NB)
+                lock_at_once(file, fcntl.LOCK_SH if together else fcntl.LOCK_EX)
             except BlockingIOError:
-                self.close()
                 raise FolderBusy from None
-            except OSError as reason:
-                if reason.errno not in (errno.ENOLCK, errno.ENOTSUP, errno.ENOSYS):  # a disk without locks: do without
-                    self.close()
-                    raise
-            if not is_at(self._lock, self.path / "lock"):  # who had it has taken the folder away meanwhile
+            self._lock = file
+            if not is_at(file, self.path / "lock"):  # who had it has taken the folder away meanwhile
                 self.close()
 
     def close(self) -> None:
