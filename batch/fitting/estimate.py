@@ -179,9 +179,7 @@ class Fitter:
 
     def fit(self) -> Fit:
         """The fit from the deck's values and from elsewhere, the best of them."""
-        ends = []
-        for begin in (self.start, *self._elsewhere()):
-            ends.append(self._minimised(begin))
+        ends = [self._minimised(begin) for begin in (self.start, *self._elsewhere())]
         values, cost, converged = min(ends, key=lambda end: end[1])
         for _ in range(MOST_ROUNDS):
             before = self.weights
@@ -269,11 +267,8 @@ class Fitter:
     def _step_from_zero(self, place: int) -> float:
         """How far to move a parameter whose value is 0, SI: the first of `PROBED` by which the squares of the weighted
         residuals add up to a hundredth of their number."""
-        values = np.tile(self.start, (2 * len(PROBED), 1))
-        values[:, place] += [*PROBED, *(-probe for probe in PROBED)]
-        change = np.sum((self.weights * (self._residuals(values) - self._first)) ** 2, axis=1)
-        change = np.where(np.isfinite(change), change, 0.0).reshape(2, -1).max(axis=0)
-        large = np.flatnonzero(change >= 0.01 * np.count_nonzero(self.weights))
+        squares = self._squared_changes(place, np.array(PROBED))
+        large = np.flatnonzero(squares >= 0.01 * np.count_nonzero(self.weights))
         return PROBED[int(large[0])] if len(large) else 1.0
 
     def _probed(self) -> np.ndarray:
@@ -282,13 +277,18 @@ class Fitter:
         ladder = 10.0 ** np.arange(-7.0, 0.0)
         step = self.size.copy()
         for place in range(len(step)):
-            values = np.tile(self.start, (2 * len(ladder), 1))
-            values[:, place] += np.concatenate([ladder, -ladder]) * self.size[place]
-            change = np.linalg.norm(self.weights * (self._residuals(values) - self._first), axis=1)
-            change = np.where(np.isfinite(change), change, 0.0).reshape(2, -1).max(axis=0)
+            change = np.sqrt(self._squared_changes(place, ladder * self.size[place]))
             large = np.flatnonzero(change >= CHANGE)
             step[place] *= ladder[int(large[0])] if len(large) else ladder[-1]
         return step
+
+    def _squared_changes(self, place: int, moves: np.ndarray) -> np.ndarray:
+        """By how much the weighted residuals change where a parameter moves by each of these, SI, up or down: the
+        larger sum of squares, [move]; 0 where both fail."""
+        values = np.tile(self.start, (2 * len(moves), 1))
+        values[:, place] += np.concatenate([moves, -moves])
+        squares = np.sum((self.weights * (self._residuals(values) - self._first)) ** 2, axis=1)
+        return np.asarray(np.where(np.isfinite(squares), squares, 0.0).reshape(2, -1).max(axis=0))
 
     def _slopes(self, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """The residuals and their slopes, [number], [number, path]. Differences are by `CHANGE` of the deviations that

@@ -179,18 +179,18 @@ class LoggedRun:
     @cached_property
     def instants(self) -> np.ndarray:
         """The instants that are fitted, s, one channel after the other, [number]."""
-        stretches = [
-            self.log.signals[channel][0][rows] for channel, rows in zip(self.channels, self._rows, strict=True)
-        ]
-        return np.concatenate(stretches) if stretches else np.empty(0)
+        return self._of_log(0)
 
     @cached_property
     def measured(self) -> np.ndarray:
         """The measured numbers at `instants`, SI, [number]."""
-        stretches = [
-            self.log.signals[channel][1][rows] for channel, rows in zip(self.channels, self._rows, strict=True)
-        ]
-        return np.concatenate(stretches) if stretches else np.empty(0)
+        return self._of_log(1)
+
+    def _of_log(self, part: int) -> np.ndarray:
+        """The instants of the log that are fitted (part 0), or the numbers measured at these (part 1), one channel
+        after the other, [number]."""
+        signals = zip(self.channels, self._rows, strict=True)
+        return np.concatenate([np.empty(0), *(self.log.signals[channel][part][rows] for channel, rows in signals)])
 
     @cached_property
     def channel_of(self) -> np.ndarray:
@@ -241,8 +241,7 @@ class LoggedRun:
 
     def cause(self, values: np.ndarray) -> str:
         """Why a case fails, in words. values: of `paths`, SI, [path]"""
-        result = engine.run(self._with(self.inputs(values[None, :])), record=False)
-        return result.cause[0]
+        return engine.run(self._with(self.inputs(values[None, :])), record=False).cause[0]
 
     @property
     def _times(self) -> np.ndarray:
