@@ -118,12 +118,10 @@ def why_unsound(group: StoredGroup) -> str:
             return f"attribute `{name}` is no number of it"
     if ("search_along_slopes" in attrs) != ("search_without_slopes" in attrs):
         return "attribute `search_along_slopes` is missing, or its other half"
-    margin = attrs.get("search_margin", 0.0)
-    if not isinstance(margin, float) or not 0.0 <= margin < 1.0:
-        return "attribute `search_margin` is no share"
-    least_margin = attrs.get("search_least_margin", 0.0)
-    if not isinstance(least_margin, float) or not 0.0 <= least_margin < 2.0:
-        return "attribute `search_least_margin` is no disk margin"
+    for name, bound, what in (("search_margin", 1.0, "share"), ("search_least_margin", 2.0, "disk margin")):
+        margin = attrs.get(name, 0.0)
+        if not isinstance(margin, float) or not 0.0 <= margin < bound:
+            return f"attribute `{name}` is no {what}"
     cases = attrs["cases_in_table"]
     try:
         if not all(0 <= judged_case.case < cases for judged_case in _decoded(attrs, "search_judged", Judged)):

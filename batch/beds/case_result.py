@@ -52,9 +52,7 @@ class CampaignRecords:
         """Add the cases in a folder that are not known yet."""
         for path in sorted(folder.glob("*.records")):
             experiment, _, row = path.stem.partition("-")
-            if not (experiment.isdecimal() and row.isdecimal()):
-                continue
-            if (int(experiment), int(row)) in self.cases:
+            if not (experiment.isdecimal() and row.isdecimal()) or (int(experiment), int(row)) in self.cases:
                 continue
             with contextlib.suppress(records.UnsoundRecords, OSError):
                 recorded = records.read(path)

@@ -101,8 +101,8 @@ class OnBeds:
         folder.beds.mkdir(exist_ok=True)
         for path in folder.beds.glob("*.records"):
             with contextlib.suppress(records.UnsoundRecords, OSError):
-                ports = records.read(path).head.get("ports", {})
-                benches = records.read(path).head.get("benches", {})
+                head = records.read(path).head
+                ports, benches = head.get("ports", {}), head.get("benches", {})
                 if not isinstance(ports, dict) or not all(isinstance(port, str) for port in ports.values()):
                     raise records.UnsoundRecords("has a head that is damaged")
                 self.check(ports, benches, f"{folder.path} holds cases of this campaign")
@@ -122,7 +122,7 @@ class OnBeds:
         task = self._waiting.popleft()
         section = self._sections[task.section]
         endings = []
-        for self._done, row in enumerate(section.rows[task.first : task.last]):
+        for self._done, row in enumerate(section.rows[task.first : task.last]):  # `under_way` tells how far it is
             endings.append(self._case(section, int(row)))
         self._done = 0
         results = [result for result, _ in endings]
@@ -195,14 +195,11 @@ class OnBeds:
         ports = self._ports
         experiment = section.prepared.experiment
         plan = plan_file.dumps(Plan("", (replace(experiment, notes=()),)))
-        transcripts = (
-            {}
-            if ports.transcripts is None
-            else {
-                joint: str(ports.transcripts / f"{experiment.name}.{row}.{joint}.transcript")
-                for joint in ports.by_joint
-            }
-        )
+        transcripts = {
+            joint: str(ports.transcripts / f"{experiment.name}.{row}.{joint}.transcript")
+            for joint in ports.by_joint
+            if ports.transcripts is not None
+        }
         begun = [name for name in transcripts.values() if not Path(name).exists()]
         request = CaseRequest(
             plan=plan,

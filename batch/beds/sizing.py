@@ -73,10 +73,8 @@ class Largest:
         most = float(np.nanmax(values))
         # the first instant with the value but for rounding, so that a constant rate is reported where it is reached
         row, k = np.unravel_index(int(np.argmax(values >= most - ROUNDING * abs(most))), values.shape)
-        instant = (
-            (float(work.time[k]), None, None) if torque is None else _operating_point(work, torque, int(row), int(k))
-        )
-        self._keep(name, Extreme(most, int(work.case[row]), *instant))
+        point = () if torque is None else (float(torque[row, k]), float(work.rate[row, k]))
+        self._keep(name, Extreme(most, int(work.case[row]), float(work.time[k]), *point))
 
     def _keep(self, name: str, extreme: Extreme) -> None:
         """Keep an extreme where it is the largest so far, but for rounding."""
@@ -86,15 +84,10 @@ class Largest:
             self.extremes[name] = extreme
 
 
-def _operating_point(work: ShaftWork, torque: np.ndarray, row: int, k: int) -> tuple[float, float, float]:
-    return float(work.time[k]), float(torque[row, k]), float(work.rate[row, k])
-
-
 def over_case(values: np.ndarray, time: np.ndarray) -> np.ndarray:
     """The integral over each case by trapezoids, up to its end, [case]. values: [case, instant]"""
     pieces = 0.5 * (values[:, 1:] + values[:, :-1]) * np.diff(time)
-    whole: np.ndarray = np.nansum(pieces, 1)
-    return whole
+    return np.asarray(np.nansum(pieces, 1))
 
 
 def root_mean_square(values: np.ndarray) -> np.ndarray:
@@ -119,8 +112,7 @@ def hottest(torque: np.ndarray, time: np.ndarray, constant: float) -> np.ndarray
     course = lfilter([share], [1.0, share - 1.0], squares, axis=1)
     after = step * np.arange(1, squares.shape[1] + 1) / constant
     begin = course[:, -1] / -math.expm1(-after[-1])
-    steady: np.ndarray = np.sqrt((course + begin[:, None] * np.exp(-after)).max(1))
-    return steady
+    return np.asarray(np.sqrt((course + begin[:, None] * np.exp(-after)).max(1)))
 
 
 class MotorFigures:

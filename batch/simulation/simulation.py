@@ -119,7 +119,7 @@ class Simulation:
         repeat = whole(repeat, "repeat", least=1)
         threads = None if threads is None else whole(threads, "threads", least=1)
         table, count = columns(self._in_si(values), product=product)
-        program = self._program({path: float(column[0]) for path, column in table.items()}, repeat > 1)
+        program = self._program(table, repeat > 1)
         check_room(count * repeat, len(program.prepared.program.inputs) + len(program.prepared.outputs))
         program.varied.check(table, count)
         if repeat > 1:
@@ -149,7 +149,7 @@ class Simulation:
         threads = None if threads is None else whole(threads, "threads", least=1)
         table, count = columns(self._in_si(values), product=False)
         check_room(count, len(table))
-        program = self._program({path: float(column[0]) for path, column in table.items()}, False)
+        program = self._program(table, False)
         program.varied.check(table, count)
         varied, key = program.varied.experiment, tuple(table)
         if key not in self._gradients:
@@ -186,7 +186,7 @@ class Simulation:
         seen = None if record is None else texts(record, "record", "E432", '["tau"]')
         key = tuple(table), tuple(kinds.items()), seen, repeat > 0
         if key not in self._stepped:
-            first = {path: (float(column[0]), self._units[path] or "1") for path, column in table.items()}
+            first = self._first_values(table)
             self._stepped[key] = program(self._deck_run, first, kinds=kinds, record=seen, repeated=repeat > 0)
         stepped_program = self._stepped[key]
         zeros = {path: np.zeros(1) for path in stepped_program.paths}
@@ -211,15 +211,19 @@ class Simulation:
             in_si[path] = values_in_si(value, path, unit or "1")
         return in_si
 
-    def _program(self, first: Mapping[str, float], repeated: bool) -> SimulationProgram:
-        """The program whose inputs are these paths, compiled with these values on the first call."""
-        key = tuple(first), repeated
+    def _program(self, table: Mapping[str, np.ndarray], repeated: bool) -> SimulationProgram:
+        """The program whose inputs are the paths of a table of values, SI, one a case; on the first call it is compiled
+        with those of the first case. repeated: whether cases have noise of their own"""
+        key = tuple(table), repeated
         if key not in self._programs:
-            values = {path: (value, self._units[path] or "1") for path, value in first.items()}
-            varied = self._deck_run.vary(values, repeat=2 if repeated else 1)
+            varied = self._deck_run.vary(self._first_values(table), repeat=2 if repeated else 1)
             prepared = engine.prepare(varied.experiment)
             self._programs[key] = SimulationProgram(varied, prepared, DatasetMaker(self._deck_run.deck.file, prepared))
         return self._programs[key]
+
+    def _first_values(self, table: Mapping[str, np.ndarray]) -> dict[str, tuple[float, str]]:
+        """The first case's value of each path, SI, with its unit."""
+        return {path: (float(column[0]), self._units[path] or "1") for path, column in table.items()}
 
     def _signals(self, histories: bool | str | Sequence[str], cases: int) -> tuple[str, ...]:
         """The names of the kept signals. Raises Problem E432 for signals that are not recorded, or do not fit in
