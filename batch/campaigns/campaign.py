@@ -288,19 +288,22 @@ def _parts(
         case = min(strays - run)
         raise Problem(error("E351", f"the history of case #{case} cannot be kept: it is not among those to run"))
     for experiment, rows in selected:
-        if experiment.structure.history_bytes:
-            own = np.asarray(named.get(experiment.name, np.empty(0, np.int64)))
-            history_places = kept_before(wanted, experiment, rows, own)
-            part = CampaignPart(experiment, rows, history_places, wanted.at_most(len(rows)), single)
-        else:
-            part = CampaignPart(experiment, rows, np.empty(0, np.int64))
+        own = np.asarray(named.get(experiment.name, np.empty(0, np.int64)))
+        has_history = experiment.structure.history_bytes > 0
         # cases that a user chooses are all run, whatever they show
         whole = len(rows) == experiment.cases.count or experiment.name in decided
-        part = replace(part, stops_early=experiment.cases.until_shown > 0 and whole)
-        if experiment.search is not None and not experiment.search.complete and whole:
-            part = replace(part, searches=True, keeps_best=wanted.default and experiment.structure.history_bytes > 0)
-            part = replace(part, history_places=part.history_places[:0] if wanted.default else part.history_places)
-        yield part
+        searches = experiment.search is not None and not experiment.search.complete and whole
+        before = has_history and not (searches and wanted.default)
+        yield CampaignPart(
+            experiment,
+            rows,
+            history_places=kept_before(wanted, experiment, rows, own) if before else np.empty(0, np.int64),
+            later=wanted.at_most(len(rows)) if has_history else 0,
+            single=single and has_history,
+            stops_early=experiment.cases.until_shown > 0 and whole,
+            searches=searches,
+            keeps_best=searches and wanted.default and has_history,
+        )
 
 
 def values_sections(campaign: Campaign) -> list[CampaignSection]:

@@ -271,8 +271,7 @@ def _results(
 ) -> Run:
     """The results of the cases of a stretch, from the kernel's outputs. fates: cases that did not end, with the status
     and the reason."""
-    rows = section.rows[first : first + len(outputs)]
-    return engine.results(section.prepared, rows, history, outputs, fates)
+    return engine.results(section.prepared, section.rows[first : first + len(outputs)], history, outputs, fates)
 
 
 def _check_bits(

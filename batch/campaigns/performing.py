@@ -136,8 +136,7 @@ def perform(
         work.leave("stopped")
         raise Problem(busy(campaign.output)) from None
     except OSError as reason:
-        kept_work = work.leave("stopped")
-        raise Problem(cannot_write(campaign.output, reason, kept_work)) from reason
+        raise Problem(cannot_write(campaign.output, reason, work.leave("stopped"))) from reason
     except BaseException:
         work.leave("stopped")
         raise
@@ -459,10 +458,6 @@ class _CampaignWork:
 
 def _stopped(code: str, message: str, work: _CampaignWork, how: str = "") -> Diagnostic:
     """The error of a campaign that stopped, with what is kept of it. how: further words on how to go on"""
-    has_folder = work.folder.path.exists()
-    helps = (
-        f"what is done is kept in {work.folder.path}: the same command goes on{how}"
-        if has_folder
-        else "nothing was kept"
-    )
+    going_on = f"what is done is kept in {work.folder.path}: the same command goes on{how}"
+    helps = going_on if work.folder.path.exists() else "nothing was kept"
     return error(code, message, help=helps)

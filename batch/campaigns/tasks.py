@@ -310,5 +310,4 @@ def not_run(section: CampaignSection, task: Task, ended: int, why: str) -> Shard
         shape = (task.cases, section.prepared.experiment.structure.schedule.rows, section.prepared.program.columns)
         history = np.full(shape, np.nan, np.float32 if section.single else np.float64)
     fates = dict.fromkeys(range(task.cases), (ended, why))
-    key = section.key(task.first, task.last)
-    return Shard(key, np.zeros((task.cases, width)), history, 0.0, fates)
+    return Shard(section.key(task.first, task.last), np.zeros((task.cases, width)), history, 0.0, fates)
