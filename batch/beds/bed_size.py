@@ -142,8 +142,8 @@ def bed_size(
     rows: np.ndarray | None = None,
     progress: Callable[[int], None] | None = None,
 ) -> BedSize:
-    """What all cases, or those of some rows of the case table, ask of the two motors of a joint's motor bed. Raises
-    Problem.
+    """The demands of all cases, or of those of some rows of the case table, on the two motors of a joint's motor bed.
+    Raises Problem.
 
     named     parts by `drive` and `load`; none: all that are listed
     progress  called with the number of cases done so far

@@ -80,20 +80,14 @@ class OnBeds:
     workers = 1
 
     def __init__(self, ports: Ports, say: Callable[[str], None] = lambda _: None) -> None:
-        self._ports, self._say = ports, say
+        self.ports, self._say = ports, say
         self._waiting: deque[Task] = deque()
         self._greeted_beds: dict[str, str] = {}
         self.about = ", ".join(dict.fromkeys(ports.by_joint.values()))
         self.known = CampaignRecords(ports.by_joint)
         self.driving: Driving | None = None
-        self._done = 0
-        self.ports = ports.by_joint
+        self.under_way = 0
         self.benches = {joint: bench_at(port) for joint, port in ports.by_joint.items()}
-        self.lock_step, self.baud = ports.lock_step, ports.baud
-
-    @property
-    def under_way(self) -> int:
-        return self._done
 
     def open(self, folder: Folder, sections: Mapping[int, CampaignSection], tell: Callable[[], None]) -> None:
         """Open the campaign's folder for records. Raises Problem E353 where cases in it were driven on other beds."""
@@ -122,9 +116,9 @@ class OnBeds:
         task = self._waiting.popleft()
         section = self._sections[task.section]
         endings = []
-        for self._done, row in enumerate(section.rows[task.first : task.last]):  # `under_way` tells how far it is
+        for self.under_way, row in enumerate(section.rows[task.first : task.last]):
             endings.append(self._case(section, int(row)))
-        self._done = 0
+        self.under_way = 0
         results = [result for result, _ in endings]
         history = np.stack([result.rows for result in results]) if section.recorded else None
         if history is not None and section.single:
@@ -155,11 +149,11 @@ class OnBeds:
         helps = "`--fresh` starts over, and removes what is done; `-o OTHER.h5` leaves it, and runs beside it"
         for joint, port in before.items():
             message = f"{what}, driven at `{port}`, and is left as it is"
-            if not same_bed(port, self.ports.get(joint, "")):
+            if not same_bed(port, self.ports.by_joint.get(joint, "")):
                 raise Problem(error("E353", message, help=helps))
             now = self.benches[joint]
             then = benches.get(joint, {}) if isinstance(benches, dict) else {}
-            if then != now and ((isinstance(then, dict) and then) or port != self.ports[joint]):
+            if then != now and ((isinstance(then, dict) and then) or port != self.ports.by_joint[joint]):
                 raise Problem(error("E353", message, help=changed_since(_other_bench(then, now))))
 
     def _case(self, section: CampaignSection, row: int) -> tuple[CaseResult, str]:
@@ -192,7 +186,7 @@ class OnBeds:
     def _drive(self, section: CampaignSection, row: int, path: Path, ended_file: Path) -> None:
         """Drive a case in a process of its own. Raises Problem, OSError, and KeyboardInterrupt once that process has
         stopped the beds."""
-        ports = self._ports
+        ports = self.ports
         experiment = section.prepared.experiment
         plan = plan_file.dumps(Plan("", (replace(experiment, notes=()),)))
         transcripts = {

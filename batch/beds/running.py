@@ -76,9 +76,9 @@ class BedProgress:
 def timings(executor: OnBeds) -> dict[str, Timing]:
     """The timing of each joint's bed, over all cases; none where the beds are in lock-step and have no time."""
     timing_of = {}
-    for joint in executor.ports:
+    for joint in executor.ports.by_joint:
         cases = executor.known.of(joint)
-        if cases and not executor.lock_step:
+        if cases and not executor.ports.lock_step:
             # a bed's ticks, and the host's clock, restart with each case
             drifts = [timing(rows, hz).drift for hz, rows in cases]
             known = [drift for drift in drifts if math.isfinite(drift)]
@@ -117,7 +117,7 @@ def timing_lines(executor: OnBeds) -> Iterator[str]:
                 f"  warning: {100.0 * times.unanswered / times.exchanges:.3g} % of the exchanges had no answer, and "
                 "commands were held longer than was computed: `met bed jitter` and `met bed probe` say more of the line"
             )
-    for joint in executor.ports if executor.lock_step else ():
+    for joint in executor.ports.by_joint if executor.ports.lock_step else ():
         silent = sum(int(((rows["flags"] & ANSWERED) == 0).sum()) for _, rows in executor.known.of(joint))
         if silent:
             yield f"{joint}: unanswered: {silent:,}; such a run has not the bits of another"
@@ -132,19 +132,19 @@ def sidecar_entries(executor: OnBeds) -> Mapping[str, Any]:
             {
                 "joint": joint,
                 "port": port,
-                "baud": executor.baud,
-                "lock_step": executor.lock_step,
+                "baud": executor.ports.baud,
+                "lock_step": executor.ports.lock_step,
                 "beds": executor.known.beds[joint],
                 **({"bench": executor.benches[joint]} if executor.benches[joint] else {}),
                 "timing": _figures(timing_of[joint]) if joint in timing_of else None,
             }
-            for joint, port in executor.ports.items()
+            for joint, port in executor.ports.by_joint.items()
         ]
     }
 
 
 def _figures(times: Timing) -> dict[str, Any]:
-    """How well the loop kept its time over the exchanges, for JSON."""
+    """The timing of a loop's exchanges with a motor bed, for JSON: counts of late and missing answers, spreads in s."""
     spreads = {"lateness": times.lateness, "trip": times.trip, "computing": times.computing}
     return {
         "exchanges": times.exchanges,

@@ -45,8 +45,8 @@ ROLES = ("drive", "load")
 
 
 def size_lines(size: BedSize, *, named: bool, curves: bool = False) -> Iterator[str]:
-    """What the cases ask of both motors of a motor bed, and the parts that fit, in lines. named: whether the parts were
-    named;  curves: with the torque-speed curves."""
+    """The demands of the cases on both motors of a motor bed, and the parts that fit, in lines. named: whether the
+    parts were named;  curves: with the torque-speed curves."""
     figures, several = size.figures, size.experiment.varies
     duration = size.experiment.structure.schedule.duration
     yield (
@@ -335,7 +335,8 @@ def as_data(size: BedSize) -> dict[str, Any]:
 
 
 def _verdict_as_data(verdict: PartVerdict) -> dict[str, Any]:
-    """What a part of a bench has of what the bed needs, for JSON: each check's demand, and the one that binds."""
+    """The verdict on a motor for a bed, for JSON, SI: the demand of each check beside the part's own figure, and the
+    check that binds."""
     binds = verdict.binds
     return {
         "role": verdict.role,

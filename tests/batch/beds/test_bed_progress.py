@@ -79,7 +79,7 @@ def test_cases_of_one_bench_are_not_those_of_another(here: Path) -> None:
     first = at(f"can:{bench}")
     first.open(folder, {}, lambda: None)
     with (folder.beds / "0-0.records").open("wb") as file:
-        records.begin(file, {"ports": first.ports, "benches": first.benches})
+        records.begin(file, {"ports": first.ports.by_joint, "benches": first.benches})
     beside = {"beds": written_beside(first)["beds"]}
     sidecar_path(here / "a.h5").write_text(json.dumps(beside))
     moved = bench.rename(here / "moved.toml")
