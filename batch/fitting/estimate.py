@@ -97,18 +97,17 @@ class Prior:
 class Fit:
     """Estimated numbers, [path], SI.
 
-    start, values   of the deck, and fitted; size: of each, what counts as a large change
+    values          fitted;  size: of each, what counts as a large change
     deviation       standard errors; not-a-number of a parameter at its limit
     covariance      of the estimates, [path, path];  factor: times a deviation is half of a 95 % interval
     wider           of each deviation, how much larger it is than white noise would make it
     at_limit        whether values above or below are not allowed;  held: whether neither is
     slopes          of the weighted residuals, [number, path], with the priors' rows last
     residuals       [number];  weights: their inverse rms, 0 for outliers
-    steps, runs     how many there were;  converged: whether they ended by themselves
+    steps           how many there were;  converged: whether they ended by themselves
     rival           other values from elsewhere that explain the logs as well, or None
     """
 
-    start: np.ndarray
     values: np.ndarray
     size: np.ndarray
     deviation: np.ndarray
@@ -121,7 +120,6 @@ class Fit:
     residuals: np.ndarray
     weights: np.ndarray
     steps: int
-    runs: int
     converged: bool
     rival: np.ndarray | None
 
@@ -193,7 +191,8 @@ class Fitter:
 
     @cached_property
     def held(self) -> np.ndarray:
-        """Whether the deck allows no value beside that of a parameter, the others staying, [path]."""
+        """True for each parameter that cannot be moved up or down by itself, since the deck refuses all values beside
+        its own, [path]."""
         moves = np.diag(1e-6 * self.size)
         refused = self.logs.refused(np.vstack([self.start + moves, self.start - moves]))
         return np.array(np.all(refused.reshape(2, -1), axis=0))
@@ -265,8 +264,8 @@ class Fitter:
         return size
 
     def _step_from_zero(self, place: int) -> float:
-        """How far to move a parameter whose value is 0, SI: the first of `PROBED` by which the squares of the weighted
-        residuals add up to a hundredth of their number."""
+        """The size of a change of a parameter whose value is 0, SI: the first of `PROBED` by which the squared changes
+        of the weighted residuals add up to a hundredth of their number."""
         squares = self._squared_changes(place, np.array(PROBED))
         large = np.flatnonzero(squares >= 0.01 * np.count_nonzero(self.weights))
         return PROBED[int(large[0])] if len(large) else 1.0
@@ -335,8 +334,8 @@ class Fitter:
     # The search
 
     def _elsewhere(self) -> np.ndarray:
-        """Where other fits begin: those of the better quarter of random values that are farthest apart, [start,
-        path]."""
+        """The values at which other fits begin: those of the better quarter of random values that are farthest apart,
+        SI, [start, path]."""
         draws = FAR * np.random.default_rng(0).standard_normal((TRIED, len(self.start)))
         values = self._values_of(draws)
         costs = self._costs(self._residuals(values), values)
@@ -440,7 +439,6 @@ class Fitter:
             covariance[np.ix_(free, free)] = inverse * np.outer(wider[free], wider[free])
             factor = float(stats.t.ppf(0.5 + 0.5 * CONFIDENCE, max(1, many - len(free))))
         return Fit(
-            self.start,
             values,
             self.size,
             np.sqrt(np.diag(covariance)),
@@ -453,7 +451,6 @@ class Fitter:
             residuals,
             self.weights,
             self.steps,
-            self.runs,
             converged,
             rival,
         )

@@ -124,7 +124,7 @@ class LoggedRun:
         return run
 
     def is_allowed(self, values: np.ndarray) -> bool:
-        """Whether a case reaches its end, within the limits of all joints and with all requirements met. values: of
+        """True if a case reaches its end, within the limits of all joints and with all requirements met. values: of
         `paths`, SI, [path]"""
         result = engine.run(self._with(self.inputs(values[None, :])), record=False)
         outside = any(excess[0] > 0.0 for excess in result.excess.values())
@@ -167,7 +167,7 @@ class LoggedRun:
 
     @property
     def thinned(self) -> bool:
-        """Whether the log has more numbers than are fitted."""
+        """True if the log has more numbers than are fitted."""
         return sum(map(len, self._usable)) > MOST_NUMBERS
 
     @cached_property
@@ -220,7 +220,8 @@ class LoggedRun:
         return out
 
     def refused(self, values: np.ndarray) -> np.ndarray:
-        """Whether a value is one that its parameter cannot have, [case]. values: of `paths`, SI, [case, path]"""
+        """True for each case with a value that its parameter cannot have, [case]. values: of `paths`, SI, [case,
+        path]"""
         broken = self.varied.broken(dict(zip(self.used, self.inputs(values).T, strict=True)), len(values))
         return np.asarray(broken | (np.abs(self._delays(values)) > LATEST))
 
@@ -240,7 +241,7 @@ class LoggedRun:
         return courses
 
     def cause(self, values: np.ndarray) -> str:
-        """Why a case fails, in words. values: of `paths`, SI, [path]"""
+        """The reason why a case fails, in words. values: of `paths`, SI, [path]"""
         return engine.run(self._with(self.inputs(values[None, :])), record=False).cause[0]
 
     @property
@@ -339,8 +340,6 @@ class LoggedRuns:
         return self.measured - np.concatenate([run.computed(values) for run in self.runs], axis=1)
 
     def refused(self, values: np.ndarray) -> np.ndarray:
-        """Whether a value is one that its parameter cannot have, [case]. values: SI, [case, path]"""
-        refused = np.zeros(len(values), dtype=bool)
-        for run in self.runs:
-            refused |= run.refused(values)
-        return refused
+        """True for each case with a value that its parameter cannot have in one of the runs, [case]. values: SI, [case,
+        path]"""
+        return np.asarray(np.any([run.refused(values) for run in self.runs], axis=0))

@@ -94,18 +94,22 @@ class FitQuestion:
 
     def comparisons(self, values: np.ndarray, runs: Sequence[LoggedRun]) -> tuple[Comparison, ...]:
         """The residuals of each log with these values, SI, [path]."""
-        comparisons = []
-        for run in runs:
-            joints = [joint.name for joint in run.deck_run.experiment.structure.joints]
-            comparisons.append(compare(run.courses(values), run.columns, joints, run.log))
-        return tuple(comparisons)
+        return tuple(
+            compare(
+                run.courses(values),
+                run.columns,
+                [joint.name for joint in run.deck_run.experiment.structure.joints],
+                run.log,
+            )
+            for run in runs
+        )
 
     def identifiable(self) -> Known:
         """The knowledge that the logs can give of the parameters at the deck's values, from their noise alone."""
         fitter = Fitter(self.logs, self.start, self.priors)
         return known(fitter.slopes_at_start(noise_of(self.logs)), fitter.size, fitter.held)
 
-    def promised(self, progress: Callable[[int], None] = lambda _: None) -> tuple[Promise, ...]:
+    def promised(self, progress: Callable[[int], None]) -> tuple[Promise, ...]:
         """The knowledge that the logs and one of each motion could give, as noisy as the logs are; of a sweep, with
         the case that leaves the least uncertainty."""
         noises = noise_of(self.logs)

@@ -292,8 +292,7 @@ def _seen(structure: Structure, record: Sequence[str] | None) -> tuple[Recorded,
     """The signals observed at each step: q, qd, and these channels; None: those that the deck records. Raises Problem
     E432."""
     known = recordable(structure, record or ())
-    signals = {name: recording for name in ALWAYS_SEEN for recording in known[name]}
-    signals = {recording.name: recording for recording in signals.values()}
+    signals = {recording.name: recording for name in ALWAYS_SEEN for recording in known[name]}
     if record is None:
         return tuple({**signals, **{recording.name: recording for recording in structure.record}}.values())
     for name in record:

@@ -223,19 +223,13 @@ def run_cases(
 
 def numbers(experiment: Experiment, run: Run) -> str:
     """The outcome of the cases so far, for the page's script: JSON."""
-    count, done = len(shown_rows(experiment)), len(run.case)
-    status = np.full(count, NOT_YET)
-    status[:done] = run.status
-    metrics = []
-    for use in (*experiment.structure.metrics, *experiment.linear_metrics):
-        values = np.full(count, np.nan)
-        values[:done] = run.metrics[use.name]
-        metrics.append(doubles(values))
+    done, uses = len(run.case), (*experiment.structure.metrics, *experiment.linear_metrics)
+    to_come = 0, len(shown_rows(experiment)) - done
     pool = Pool(experiment.name, [GroupInMemory.of_run(experiment, run)])
     points = overview(pool)
     data = {
-        "status": status.tolist(),
-        "metrics": metrics,
+        "status": np.pad(run.status, to_come, constant_values=NOT_YET).tolist(),
+        "metrics": [doubles(np.pad(run.metrics[use.name], to_come, constant_values=np.nan)) for use in uses],
         "done": done,
         "failed": int((run.status != DONE).sum()),
         "failures": [[failure.count, visible(failure.cause), failure.row] for failure in pool.failures[:5]],

@@ -20,6 +20,8 @@ class Board:
     page      number of the page that is shown, 0 of none;  numbers: of its cases' numbers, 0 of none
     doing     what is being done, in words; "" where all is done
     saved     when the deck was saved that is shown, and broken: when the one was that is not; s since 1970
+
+    `ended`, which is no part of the state: whether nobody is to wait for it any more.
     """
 
     def __init__(self, name: str) -> None:
@@ -32,7 +34,7 @@ class Board:
         self._number = 1
         self._texts: dict[str, dict[int, bytes]] = {"page": {}, "numbers": {}}
         self._chosen: tuple[str, str | None] | None = None
-        self._ended = False
+        self.ended = False
 
     def tell(self, shown_page: int | None = None, **changes: Any) -> None:
         """Change entries of the state. shown_page: that which they concern, where they count only while it is shown"""
@@ -64,7 +66,7 @@ class Board:
     def after(self, number: int, seconds: float) -> tuple[int, Mapping[str, Any] | None]:
         """The first state after that of this number, waiting at most this long; None where there is none yet."""
         with self._changed:
-            self._changed.wait_for(lambda: self._number > number or self._ended, seconds)
+            self._changed.wait_for(lambda: self._number > number or self.ended, seconds)
             return self._number, dict(self._state) if self._number > number else None
 
     def choose(self, run: str, group: str | None) -> bool:
@@ -88,9 +90,5 @@ class Board:
     def end(self) -> None:
         """Release everybody who waits."""
         with self._changed:
-            self._ended = True
+            self.ended = True
             self._changed.notify_all()
-
-    @property
-    def ended(self) -> bool:
-        return self._ended

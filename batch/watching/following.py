@@ -147,7 +147,7 @@ def path_of(name: str) -> Path:
 
 
 def _stamp(path: Path) -> Stamp:
-    """What tells a file's state from another: its time (ns), size and inode; None where there is none."""
+    """The time (ns), size and inode of a file, by which a changed file is noticed; None where there is none."""
     try:
         about = os.stat(path)
     except OSError:
@@ -203,6 +203,7 @@ class _Loop:
         confess: Callable[[Exception], str],
         tell: Callable[[str], None] | None = None,
     ) -> None:
+        """Watch the deck's files; nothing is compiled before `run`."""
         self._deck, self._name, self._board, self._confess, self._tell = deck, name, board, confess, tell
         self._group: str | None = None
         self._files = DeckFiles(deck.file, deck.include_dirs)
@@ -267,8 +268,8 @@ class _Loop:
             "names": list(answer.names),
             "groups": list(answer.groups),
             "messages": answer.messages,
+            "fault": False,
         }
-        state["fault"] = False
         if answer.experiment is None:
             self._board.tell(**state, broken=True, tried=begun, doing="")
             return False
