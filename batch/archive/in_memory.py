@@ -69,7 +69,7 @@ class DatasetMaker:
         return dataset
 
     def _lay_out(self, count: int, signals: frozenset[str]) -> DatasetLayout:
-        """What all Datasets of `count` cases with these signals share: their variables, and the values that no run
+        """The layout of Datasets of `count` cases with these signals: their variables, with the values that no run
         changes."""
         import xarray
 

@@ -241,6 +241,7 @@ class ArchiveFile:
     """An open archive, to be used in a `with`. Raises Problem E301 (no such file), E302 (no archive), E303 (newer)."""
 
     def __init__(self, path: str | Path) -> None:
+        """Open the file, and check its signature, references, schema and groups before any value is given out."""
         self.path = Path(path)
         self._arithmetic = np.errstate(over="ignore", invalid="ignore")
         check_signature(self.path)

@@ -162,6 +162,8 @@ class _CampaignWork:
         say: Callable[[str], None],
         more: Callable[[], Mapping[str, Any]],
     ) -> None:
+        """Begin with all cases of the campaign; nothing is written yet. values: a section of cases for each part of the
+        campaign; key: of the campaign (`resuming.campaign_key`); the rest: as for `perform`"""
         self.campaign, self.folder, self.key, self.say, self.more = campaign, folder, key, say, more
         self.sections = {section.number: section for section in values}
         self.values = self.final_sections = values
@@ -179,10 +181,8 @@ class _CampaignWork:
     def begin(self, fresh: bool) -> None:
         """Make the folder, or take up the existing one. Raises Problem E353 where it belongs to another campaign."""
         self.resumed = bool(self.folder.named_tasks(0)) and not fresh
-        for note in resuming.take_up(self.folder, self.campaign, self.values, self.key, fresh):
-            self._note(note)
-        for note in died_lines(self.folder) if self.resumed else ():
-            self._note(note)
+        self._note(*resuming.take_up(self.folder, self.campaign, self.values, self.key, fresh))
+        self._note(*(died_lines(self.folder) if self.resumed else ()))
         self.ours = True
         self.folder.finish_removal()
         resuming.describe(self.folder, self.campaign, self.values, self.key)
@@ -278,8 +278,7 @@ class _CampaignWork:
         ]
         best = {number: [search.answer.case] for number, search in searches.items()}
         self.whole, notes = with_known_rows(self.campaign, self.final_sections, best)
-        for note in notes:
-            self._note(note)
+        self._note(*notes)
 
     def _summarise(self) -> None:
         """Go on with the few cases whose rows are kept, and a summary of all, if a summary is asked for."""
@@ -444,16 +443,17 @@ class _CampaignWork:
         """Say what was found of an earlier run of the campaign."""
         driver = self.driver
         assert driver is not None
-        for text in driver.messages:
-            self._note(text)
+        self._note(*driver.messages)
         driver.messages.clear()
         done = sum(count.done for count in driver.counts.values())
         if first and done:
             self._note(f"goes on: {self._of_all(done)} are done")
 
-    def _note(self, text: str) -> None:
-        self.notes.append(text)
-        self.say(text)
+    def _note(self, *texts: str) -> None:
+        """Say these lines, and keep them for the archive's sidecar."""
+        self.notes += texts
+        for text in texts:
+            self.say(text)
 
 
 def _stopped(code: str, message: str, work: _CampaignWork, how: str = "") -> Diagnostic:

@@ -74,7 +74,8 @@ def rehearse(timeout: float | None, **question: Any) -> None:
 
 
 def _ended(process: subprocess.Popen[bytes], limit: float | None) -> str:
-    """How a process ended, in words, after a wait of at most `limit` s; one that goes on is sent SIGABRT."""
+    """Wait for a process, at most `limit` s, and return in words how it ended; one that goes on is sent SIGABRT, so
+    that it prints its traceback."""
     try:
         status = process.wait(limit)
     except subprocess.TimeoutExpired:

@@ -6,6 +6,7 @@ import os
 import socket
 import time
 from collections.abc import Iterator
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -41,6 +42,8 @@ class Reporter:
     """Progress display that also writes a status file. name: of one job among several that work in a folder"""
 
     def __init__(self, folder: Folder, cases: int, progress: Progress | None = None, name: str = "") -> None:
+        """Prepare the record of a campaign that is about to start; nothing is written yet. cases: of the campaign in
+        all; progress: the display that is told the same, if any"""
         self._path = folder.path / (f"status.{name}.json" if name else "status.json")
         self._progress = progress
         self._next = 0.0
@@ -69,16 +72,16 @@ class Reporter:
             "workers": workers,
             "section_began": time.time(),
             "at_first": done,
+            "section_done": done,
+            "failed": failed,
         }
-        self._take(done, failed)
         self._write()
         if self._progress is not None:
             self._progress.begin(name, cases, done, failed, workers)
 
     def advance(self, done: int, failed: int, more: str = "") -> None:
         """Take the numbers of done and failed cases, show them, and write the status file now and then."""
-        self._take(done, failed)
-        self._record["more"] = more
+        self._record |= {"section_done": done, "failed": failed, "more": more}
         if time.monotonic() > self._next:
             self._write()
         if self._progress is not None:
@@ -93,17 +96,12 @@ class Reporter:
         self._record["state"] = state
         self._write()
 
-    def _take(self, done: int, failed: int) -> None:
-        self._record |= {"section_done": done, "failed": failed}
-
     def _write(self) -> None:
         """Write the status file; a full disk is left to whoever writes results."""
         self._next = time.monotonic() + WRITE_SECONDS
         self._record["updated"] = time.time()
-        try:
+        with suppress(OSError):  # the writer of results reports a full disk
             write_json(self._path, self._record)
-        except OSError:  # the writer of results reports a full disk
-            pass
 
 
 def status_records(folder: Folder) -> list[dict[str, Any]]:
@@ -212,12 +210,10 @@ def lines(data: dict[str, Any]) -> Iterator[str]:
 def finished_archive(archive: Path) -> dict[str, Any] | None:
     """Data about a finished archive from its sidecar: its cases, and when it was begun; None where there is none.
     Raises Problem for an unsound archive."""
-    try:
+    with suppress(OSError, ValueError, LookupError, TypeError):
         sidecar = read_json(sidecar_path(archive))
         cases = sum(record["cases"] for record in sidecar["experiments"] if is_count(record["cases"]))
         return {"archive": str(archive), "cases": cases, "began": str(sidecar["began"])} if archive.is_file() else None
-    except (OSError, ValueError, LookupError, TypeError):
-        pass
     if not archive.exists():
         return None
     with ArchiveFile(archive) as file:

@@ -16,6 +16,7 @@ import tempfile
 import threading
 import time
 from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -98,11 +99,9 @@ class Child:
         self.kill()
         self._process.wait()
         for pipe in (self._process.stdin, self._process.stdout, self._words):
-            try:
+            with suppress(OSError):  # what was not sent when it died
                 if pipe is not None:
                     pipe.close()
-            except OSError:  # what was not sent when it died
-                pass
 
     def _message(self, seconds: float) -> dict[str, Any] | None:
         """The next message; None where there is none within this time, or none any more (`_ended`)."""

@@ -84,6 +84,7 @@ class Dask:
         timeout: float | None = None,
         say: Callable[[str], None] = _say,
     ) -> None:
+        """Check the argument that names a cluster. Raises Problem, TypeError; nothing is connected before `open`."""
         check(dask)
         self.under_way = 0
         self._dask, self._threads, self._timeout, self._say = dask, threads or 1, timeout, say
