@@ -461,7 +461,8 @@ def _thing(field: str, old: Any, new: Any, before: Structure, now: Structure) ->
         old_value, two = getattr(old, field_.name), getattr(new, field_.name)
         if field_.name == "divisor":
             rates = [_rate(divisor, structure.schedule) for divisor, structure in ((old_value, before), (two, now))]
-            if rates[0] != rates[1] and not _with_dynamics(old_value, two, before, now):
+            # a part that ticks once a step of the dynamics changes with them, which are told by themselves
+            if rates[0] != rates[1] and (old_value, two) != (before.schedule.dynamics, now.schedule.dynamics):
                 yield field_.name, f"rate {rates[0]} -> {rates[1]}"
         elif old_value == two or in_key(field_) == "never" or field_.name in NOT_TOLD:
             continue
@@ -478,12 +479,6 @@ def _thing(field: str, old: Any, new: Any, before: Structure, now: Structure) ->
                 yield field_.name, f"of {_word(old_value)} -> of {_word(two)}"
         else:
             yield field_.name, f"{field_.name} {_word(old_value)} -> {_word(two)}"
-
-
-def _with_dynamics(divisor: int | None, two: int | None, before: Structure, now: Structure) -> bool:
-    """True if a part ticked once a step of the dynamics and still does: the dynamics' own change then covers its
-    rate."""
-    return divisor == before.schedule.dynamics and two == now.schedule.dynamics
 
 
 def _rate(divisor: int | None, schedule: Schedule) -> str:

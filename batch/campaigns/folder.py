@@ -213,14 +213,9 @@ class Folder:
         """The sections by their numbers, for a worker. Raises Problem E353 where this code is not that of the campaign,
         as after an update of MET or of models while jobs waited: its results would not count."""
         plan = self.plan(every_case=False)  # its writer has checked all of them
-        experiments = [engine.prepare(experiment) for experiment in plan.experiments]
+        experiments = [self._grown(engine.prepare(each), number) for number, each in enumerate(plan.experiments)]
         out = {}
         described = self.described()
-        searched = {description["experiment"] for description in described["sections"] if description.get("searches")}
-        experiments = [
-            self._grown(experiment, number) if number in searched else experiment
-            for number, experiment in enumerate(experiments)
-        ]
         for description in described["sections"]:
             number, position = description["number"], description["experiment"]
             if position >= len(experiments):
@@ -243,15 +238,15 @@ class Folder:
     def with_new_cases(self, section: CampaignSection) -> CampaignSection:
         """A section of a search with the cases that were asked for meanwhile; any other is unchanged. Raises
         Problem."""
-        if section.prepared.experiment.search is None or not points_path(self.path, section.number).exists():
-            return section
-        prepared = self._grown(section.prepared, section.number)
-        return replace(section, prepared=prepared, rows=all_rows(prepared.experiment.cases.count))
+        grown = self._grown(section.prepared, section.number)
+        same = grown is section.prepared
+        return section if same else replace(section, prepared=grown, rows=all_rows(grown.experiment.cases.count))
 
     def _grown(self, prepared: engine.Prepared, number: int) -> engine.Prepared:
-        """The program of a search with the cases that were asked for so far. Raises Problem."""
+        """The program of a search with the cases that were asked for so far; any other is unchanged, as is one that has
+        not begun. Raises Problem."""
         path = points_path(self.path, number)
-        if not path.exists():  # not begun
+        if prepared.experiment.search is None or not path.exists():
             return prepared
         try:
             return grown_program(prepared, read_points(path, prepared.experiment))
@@ -424,17 +419,17 @@ def _checked(data: Any) -> dict[str, Any]:
         and all(is_count(section["number"]) for section in sections)
         and all(section["number"] < other["number"] for section, other in pairwise(sections))
     )
-    for section in sections if good else ():
-        good = good and (
-            is_count(section["experiment"])
-            and is_count(section["cases"])
-            and isinstance(section["name"], str)
-            and isinstance(section["code"], str)
-            and section["rows"] in (None, f"rows.{section['number']}.npy")
-            and all(isinstance(section[name], bool) for name in ("again", "recorded", "single"))
-            and isinstance(section.get("stops_early", False), bool)
-            and isinstance(section.get("searches", False), bool)
-        )
+    good = good and all(
+        is_count(section["experiment"])
+        and is_count(section["cases"])
+        and isinstance(section["name"], str)
+        and isinstance(section["code"], str)
+        and section["rows"] in (None, f"rows.{section['number']}.npy")
+        and all(isinstance(section[name], bool) for name in ("again", "recorded", "single"))
+        and isinstance(section.get("stops_early", False), bool)
+        and isinstance(section.get("searches", False), bool)
+        for section in sections
+    )
     if not good:
         raise ValueError("it is no description of a campaign")
     return dict(data)

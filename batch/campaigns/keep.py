@@ -232,7 +232,7 @@ def summarise(
     wanted: KeptRows,
     *,
     verified: bool,
-    progress: Callable[[int], None] = lambda _: None,
+    progress: Callable[[int], None],
 ) -> Summarised:
     """The summary of all cases of a section. runs: their results in order, in blocks of one size, each with the place
     of its first case; verified: whether some are run with shorter steps, and need their rows. Raises Problem E351."""

@@ -49,7 +49,7 @@ def merge(
     folder: Folder,
     values: CampaignSection,
     histories: CampaignSection | None,
-    progress: Callable[[int], None] = lambda _: None,
+    progress: Callable[[int], None],
     *,
     threads: int | None = None,
 ) -> CaseOutcomes:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -86,11 +86,10 @@ def replay(
                 picked_rows.append((experiment, np.asarray(wanted, dtype=np.int64)))
                 if everything:
                     history_rows[experiment.name] = np.searchsorted(table, positions[experiment.name])
-    few = sorted({position for positions in rows.values() for position in positions})
     if everything:
         word = "again"
     else:
-        word = "failed" if failed else "case" + "-".join(map(str, few)) if len(few) <= MOST_IN_NAME else "cases"
+        word = "failed" if failed else _cases_word(position for positions in rows.values() for position in positions)
     return Replay(Path(archive), plan, tuple(picked_rows), word, history_rows if everything else None, tuple(decided))
 
 
@@ -101,9 +100,16 @@ def _of_summary(file: ArchiveFile, names: Sequence[str], cases: Sequence[str]) -
         raise Problem(error("E357", f"which cases of {file.path} are to be run again?", help="`--case '#7'` says it"))
     experiments = [experiment for experiment in plan.experiments if experiment.name in wanted]
     picked = tuple((experiment, np.asarray(rows)) for experiment, rows in choosing.select_rows(experiments, cases))
-    few = sorted({int(experiment.cases.table[row]) for experiment, rows in picked for row in rows.tolist()})
-    word = "case" + "-".join(map(str, few)) if len(few) <= MOST_IN_NAME else "cases"
-    return Replay(file.path, plan, picked, word)
+    return Replay(
+        file.path, plan, picked, _cases_word(int(e.cases.table[row]) for e, rows in picked for row in rows.tolist())
+    )
+
+
+def _cases_word(positions: Iterable[int]) -> str:
+    """The word for these cases, by their positions in the case table, in a default archive's name: `case3-7`, or
+    `cases` where they are more than `MOST_IN_NAME`."""
+    few = sorted(set(positions))
+    return "case" + "-".join(map(str, few)) if len(few) <= MOST_IN_NAME else "cases"
 
 
 def _row(group: ArchiveGroup, position: int) -> int:

@@ -209,7 +209,7 @@ def described(folder: Folder) -> Campaign:
         message = f"{folder.path} says that it fills {description['archive']}, which has another folder"
         raise Problem(error("E350", message, help="give the folder the name back that it had"))
     plan = folder.plan()
-    first = sorted((section for section in folder.sections().values()), key=lambda section: section.number)
+    first = sorted(folder.sections().values(), key=lambda section: section.number)
     selected = [(section.prepared.experiment, section.rows) for section in first[: len(plan.experiments)]]
     return prepare(
         plan,

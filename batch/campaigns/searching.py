@@ -38,18 +38,16 @@ class TuningSlopes:
     """Slopes of a campaign's tuning (`SlopeSource`). The program is compiled when slopes are first asked for.
 
     The results depend on the cases alone, to the bit, so a resumed tuning asks for the same cases again.
+
+    requirements  of the run, by which each case is judged
     """
 
     def __init__(self, experiment: Experiment) -> None:
         assert experiment.search is not None
         self._experiment, self._search = experiment, experiment.search
+        self.requirements: Sequence[Requirement] = experiment.requirements
         names = (self._search.metric, *(requirement.metric for requirement in experiment.requirements))
         self._metrics = tuple(dict.fromkeys(names))
-
-    @property
-    def requirements(self) -> Sequence[Requirement]:
-        """The run's requirements, by which each case is judged."""
-        return self._experiment.requirements
 
     @cached_property
     def _program(self) -> GradientProgram:
@@ -110,6 +108,7 @@ class CampaignSearch:
     """A search on its way.
 
     section  all cases that were asked for so far, in the order in which they were
+    table    the same, [case, coordinate], SI
     worth    what each of those is worth that are done, by the least margin too where that steers
     """
 
@@ -124,30 +123,20 @@ class CampaignSearch:
         self._done: list[np.ndarray] = []
         self._by_requirements: list[np.ndarray] = []
         self._method = search_method(self.search, TuningSlopes(experiment) if self.search.gradients else None)
-        self._table = np.empty((0, len(experiment.cases.coordinates)))
+        self.table = np.empty((0, len(experiment.cases.coordinates)))
         self._generations: list[int] = []
-
-    @property
-    def generations(self) -> int:
-        """The number of generations that were asked for."""
-        return len(self._generations)
-
-    @property
-    def table(self) -> np.ndarray:
-        """All cases so far, [case, coordinate], SI."""
-        return self._table
 
     def grow(self) -> tuple[int, int] | None:
         """Ask for the next generation: the stretch of its cases; None when the search has ended, and the section is
         whole."""
-        generation, first = self._method.ask(), len(self._table)
+        generation, first = self._method.ask(), len(self.table)
         if not len(generation):
             self._complete()
             return None
-        self._table = np.concatenate([self._table, generation])
+        self.table = np.concatenate([self.table, generation])
         self._generations.append(len(generation))
-        self.section = grown(self.section, self._table)
-        return first, len(self._table)
+        self.section = grown(self.section, self.table)
+        return first, len(self.table)
 
     def take(self, run: Run) -> None:
         """Take the results of the last generation's cases, in their order."""
@@ -186,7 +175,7 @@ class CampaignSearch:
     def answer(self) -> Answer:
         """The best so far."""
         metrics = {name: np.concatenate(parts) for name, parts in self._metrics.items()}
-        table = self._table[: len(self.worth)]
+        table = self.table[: len(self.worth)]
         return answer(self.search, table, np.concatenate(self._done), metrics, self._requirements)
 
     def _complete(self) -> None:
@@ -194,11 +183,11 @@ class CampaignSearch:
         fresh cases where the deck asks for it."""
         prepared = self.section.prepared
         search = replace(self.search, generations=tuple(self._generations), **steps_of(self._method))
-        search = replace(search, starts=starts_of(self._method, search, self._table, self.worth))
+        search = replace(search, starts=starts_of(self._method, search, self.table, self.worth))
         if search.kind == "tune" and search.least_margin:
-            designs = designs_that_stand(search, self._table, self.worth)
+            designs = designs_that_stand(search, self.table, self.worth)
             if search.steers and not designs:  # none keeps the margin: judge those that meet the requirements
-                designs = designs_that_stand(search, self._table, np.concatenate(self._by_requirements))
+                designs = designs_that_stand(search, self.table, np.concatenate(self._by_requirements))
             search = replace(search, judged=judged_designs(prepared, search, designs))
         self.search = search
         if search.fresh and self.answer.stands:
@@ -207,9 +196,10 @@ class CampaignSearch:
         self.section = replace(self.section, prepared=prepared.of_cases(experiment))
 
     def _confirmation(self, best: Answer) -> Confirmation:
-        """How the answer comes out in the cases that did not choose it."""
+        """The result of a tuning's answer in fresh cases, which did not choose it: the best design is run with each row
+        of plant values that the search drew for this. best: the answer so far"""
         search, prepared = self.search, self.section.prepared
-        chosen = self._table[best.case, : len(search.parameters)]
+        chosen = self.table[best.case, : len(search.parameters)]
         table = np.array([[*chosen, *plant] for plant in search.fresh])
         program = prepared.of_cases(with_cases(prepared.experiment, table))
         rows = np.arange(len(table))
