@@ -32,19 +32,13 @@ def written_unit(text: str, unit: str) -> tuple[str, float] | None:
     except ValueError:
         return None
     limit = _OVER_CASES.sub("", re.split(r"[<>]=?", text, maxsplit=1)[-1])
-    for number in _NUMBER.finditer(limit):
-        written = limit[number.end() :].strip()
+    words = [limit[number.end() :].strip() for number in _NUMBER.finditer(limit)]
+    words += _COMPARED.findall(text) if _OVER_TIME.match(text) else []
+    for written in words:
         try:
             measure = parse_unit(written)
         except ValueError:
             continue
         if units.same(measure.dimension, wanted):
             return written, measure.scale
-    for compared in _COMPARED.finditer(text) if _OVER_TIME.match(text) else ():
-        try:
-            measure = parse_unit(compared[1])
-        except ValueError:
-            continue
-        if units.same(measure.dimension, wanted):
-            return compared[1], measure.scale
     return None

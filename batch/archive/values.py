@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -10,9 +10,7 @@ from batch.archive import layout as archive_layout
 from batch.archive.layout import AT_LIMIT, EXCESS, EXTREME_AT, GRAPPLE, Layout
 from batch.archive.searched import GENERATION
 from met.plan import Experiment, keys
-
-if TYPE_CHECKING:
-    from met.run import Run
+from met.run import Run
 
 KINDS = {"float64": np.float64, "float32": np.float32, "int64": np.int64, "int8": np.int8, "str": object}
 """The type of an array for each kind of variable."""

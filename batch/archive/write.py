@@ -11,7 +11,7 @@ import hashlib
 from collections.abc import Mapping, Sequence
 from dataclasses import field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -28,10 +28,8 @@ from met.plan import Experiment, Plan, recipes
 from met.plan import file as plan_file
 from met.plan.columns import LISTED_ROWS, CaseValues, blocks
 from met.plan.uses import packages
+from met.run import Run
 from met.version import VERSION
-
-if TYPE_CHECKING:
-    from met.run import Run
 
 
 @frozen
