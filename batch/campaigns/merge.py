@@ -153,9 +153,12 @@ def shards_in_order(
     def read(task: Task, end: int) -> tuple[int, Shard]:
         """A task's shard without cases before `end`, and `end`. Raises Missing."""
         try:
-            return end, _without(folder.read(section, task), end - task.first)
+            read_shard = folder.read(section, task)
         except (UnsoundShard, OSError) as reason:
             raise Missing(f"shard {task.name} {reason}") from reason
+        if end > task.first:
+            read_shard = _part(read_shard, np.arange(end - task.first, task.cases), read_shard.key)
+        return end, read_shard
 
     tasks, end = [], 0
     for task in folder.named_tasks(section.number):
@@ -246,20 +249,12 @@ def with_rows(folder: Folder, section: CampaignSection, places: np.ndarray, numb
 
 
 def _part(original: Shard, cases: np.ndarray, key: str) -> Shard:
-    """Some cases of a shard as a new shard, without computing time, which stays with the original."""
+    """Some cases of a shard, by their places in it, as a new shard with this key, without computing time, which stays
+    with the original."""
     history = None if original.history is None else original.history[cases]
     to = {case: place for place, case in enumerate(cases.tolist())}
     fates = {to[case]: fate for case, fate in original.fates.items() if case in to}
     return Shard(key, original.outputs[cases], history, 0.0, fates)
-
-
-def _without(original: Shard, first: int) -> Shard:
-    """A shard without its first cases."""
-    if not first:
-        return original
-    history = None if original.history is None else original.history[first:]
-    fates = {case - first: fate for case, fate in original.fates.items() if case >= first}
-    return Shard(original.key, original.outputs[first:], history, original.seconds, fates)
 
 
 def _results(

@@ -321,8 +321,7 @@ class _CampaignWork:
         return sections_again
 
     def _results(self, section: CampaignSection) -> CaseOutcomes:
-        wanted = worst_wanted(self.campaign.keep, section.prepared.experiment)
-        return merge.results(self.folder, section, wanted)
+        return merge.results(self.folder, section, worst_wanted(self.campaign.keep, section.prepared.experiment))
 
     def _merge(self, histories: Mapping[int, CampaignSection]) -> None:
         """Write the archive from all shards, under a temporary name that becomes its own when it is whole."""

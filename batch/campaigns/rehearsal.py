@@ -118,9 +118,7 @@ def _is_a_models(file: str) -> bool:
     ours = ("<", *(str(home / name) + os.sep for name in ("batch", "hw", "ic", "met")))
     python = [os.path.dirname(os.__file__) + os.sep, sysconfig.get_paths()["stdlib"] + os.sep]
     installed = any(f"{os.sep}{name}{os.sep}" in file for name in ("site-packages", "dist-packages"))
-    if file.startswith(ours):
-        return False
-    return installed or not file.startswith(tuple(python))
+    return not file.startswith(ours) and (installed or not file.startswith(tuple(python)))
 
 
 # In the process

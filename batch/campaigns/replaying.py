@@ -138,8 +138,9 @@ def differences(before: str | Path, after: str | Path) -> list[str]:
                     out.append(f"#{case} of {new.name}: {name} was {_plain(a[place])}, is {_plain(b[place])}")
             old_code, new_code = (group.attributes.get("code_key") for group in (old, new))
             if out and comparable(old_code, new_code) and old_code != new_code:  # older archives have none
-                what = f"the program of `{new.name}` is another"
-                out.insert(0, f"{what}: MET's code, or that of models, has changed since")
+                out.insert(
+                    0, f"the program of `{new.name}` is another: MET's code, or that of models, has changed since"
+                )
     return out[:MOST_TOLD] + ([f"and {len(out) - MOST_TOLD} more"] if len(out) > MOST_TOLD else [])
 
 
@@ -169,12 +170,11 @@ def _signals(old: ArchiveGroup, new: ArchiveGroup, places: np.ndarray, ran: np.n
 
 def _alike(before: np.ndarray, after: np.ndarray) -> np.ndarray:
     """True where two arrays have the same bits; all not-a-numbers are alike."""
-    if before.dtype.kind == "f":
-        whole = np.dtype(f"i{before.dtype.itemsize}")
-        bits = [np.ascontiguousarray(values, before.dtype).view(whole) for values in (before, after)]
-        same = bits[0] == bits[1]
-        return np.asarray(same | (np.isnan(before) & np.isnan(after)))
-    return np.asarray(before == after)
+    if before.dtype.kind != "f":
+        return np.asarray(before == after)
+    whole = np.dtype(f"i{before.dtype.itemsize}")
+    bits = [np.ascontiguousarray(values, before.dtype).view(whole) for values in (before, after)]
+    return np.asarray((bits[0] == bits[1]) | (np.isnan(before) & np.isnan(after)))
 
 
 def _plain(value: object) -> str:

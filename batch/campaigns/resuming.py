@@ -71,12 +71,13 @@ def as_begun(folder: Folder, campaign: Campaign, values: list[CampaignSection]) 
 
 
 def settled(campaign: Campaign, values: Sequence[CampaignSection]) -> Campaign:
-    """The campaign, with `verify` as "auto" where that has the same effect."""
+    """The campaign, with `verify` as "auto" where that has the same effect in each experiment: so equal campaigns are
+    equal however the choice was written."""
     if campaign.verify == "auto" or campaign.open_ended:  # the number of cases is not known yet
         return campaign
-    return replace(
-        campaign, verify=verifying.settled(campaign.verify, ((value.prepared, len(value.rows)) for value in values))
-    )
+    sections = [(value.prepared, len(value.rows)) for value in values]
+    same = all(verifying.resolve(campaign.verify, *each) == verifying.resolve("auto", *each) for each in sections)
+    return replace(campaign, verify="auto") if same else campaign
 
 
 def _begun_key(folder: Folder, campaign: Campaign) -> str:
@@ -265,8 +266,7 @@ def _asked_sum(campaign: Campaign) -> str:
                 summed.update(values.tobytes())
         return {"index": index}
 
-    text = plan_file.dumps(campaign.plan, refer)
-    summed.update(text.encode())
+    summed.update(plan_file.dumps(campaign.plan, refer).encode())
     for part in campaign.parts:
         for piece in blocks(len(part.rows)):
             summed.update(np.asarray(part.rows[piece]).tobytes())

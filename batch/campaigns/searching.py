@@ -16,7 +16,7 @@ from batch.campaigns import tasks
 from batch.campaigns.drive import Count, Driver, Stopped
 from batch.campaigns.folder import uncovered
 from batch.campaigns.judging import judged_designs
-from batch.campaigns.points import grown, with_cases, write_points
+from batch.campaigns.points import grown, grown_program, with_cases, write_points
 from batch.campaigns.tasks import CampaignSection, Task
 from batch.queries.search_answers import progress
 from met import run as engine
@@ -201,7 +201,7 @@ class CampaignSearch:
         search, prepared = self.search, self.section.prepared
         chosen = self.table[best.case, : len(search.parameters)]
         table = np.array([[*chosen, *plant] for plant in search.fresh])
-        program = prepared.of_cases(with_cases(prepared.experiment, table))
+        program = grown_program(prepared, table)
         rows = np.arange(len(table))
         run = engine.results(program, rows, None, engine.compute(program, rows, record=False)[1], {})
         done = run.status == DONE

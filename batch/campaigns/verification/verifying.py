@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 from typing import Literal
@@ -89,13 +89,6 @@ def resolve(wanted: Verify, prepared: Prepared, cases: int) -> Verify:
         return "some" if short else "none"
     added = most(metrics, cases) * sum(FACTORS) * steps + len(FACTORS) * PREPARING
     return "some" if added <= SHARE * cases * steps else "none"
-
-
-def settled(wanted: Verify, sections: Iterable[tuple[Prepared, int]]) -> Verify:
-    """`auto` where the choice equals that of `auto` for each experiment; else the choice itself. So equal campaigns are
-    equal however the choice was written."""
-    same = all(resolve(wanted, *section) == resolve("auto", *section) for section in sections)
-    return "auto" if same else wanted
 
 
 FACTORS = (2, 4)

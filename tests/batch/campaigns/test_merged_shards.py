@@ -147,10 +147,10 @@ def test_a_block_has_the_fates_of_its_own_cases_and_none_is_empty() -> None:
 def test_a_shard_loses_its_first_cases_with_their_fates_and_histories() -> None:
     fates = {1: (LOST, DIED), 2: (TIMED_OUT, "slow"), 4: (LOST, DIED)}
     whole = replace(a_shard(section_of(range(6), recorded=True), 0, 6), fates=fates)
-    cut = merge._without(whole, 2)
+    cut = merge._part(whole, np.arange(2, 6), whole.key)
     assert cut.outputs[:, -1].tolist() == [2.0, 3.0, 4.0, 5.0] and cut.fates == {0: fates[2], 2: fates[4]}
     assert cut.history is not None and cut.history[:, 0, 0].tolist() == [-2.0, -3.0, -4.0, -5.0]
-    assert cut.key == whole.key and cut.seconds == whole.seconds
+    assert cut.key == whole.key and cut.seconds == 0.0
 
 
 def test_blocks_have_65536_cases(monkeypatch: pytest.MonkeyPatch) -> None:
