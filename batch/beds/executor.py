@@ -178,8 +178,7 @@ class OnBeds:
             why = str(read_json(ended_file)["why"]) or why
         if not why:
             return result, ""
-        ticks = section.prepared.experiment.structure.schedule
-        time = float(result.outputs[2]) / ticks.base_hz
+        time = float(result.outputs[2]) / section.prepared.experiment.structure.schedule.base_hz
         self._say(f"case #{section.prepared.experiment.cases.table[row]}, t = {time:g} s: {why}")
         return result, f"t = {time:g} s: {why}"
 

@@ -156,8 +156,7 @@ def _check_sheet(sheet: DataSheet, joint: str) -> None:
     for name, unit in UNITS.items():
         if not 0.0 < sheet.values[name] < math.inf:
             message = f"joint `{joint}`: the search cannot begin at {name} = {sheet.values[name]:g} {unit}"
-            helps = "write in the deck what it is about; it may be off by 30 %"
-            raise Problem(error("E424", message, help=helps))
+            raise Problem(error("E424", message, help="write in the deck what it is about; it may be off by 30 %"))
 
 
 def _check_output(deck: Path, records: Path) -> None:

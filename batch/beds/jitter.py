@@ -77,8 +77,7 @@ def jitter_and_tell(
     **options: Any,
 ) -> bool:
     """Run `met bed jitter`. Returns True where no run would have been stopped. Raises Problem."""
-    bed = chosen_bed(word, source, names, quiet=quiet, **options)
-    data, warnings = measured(bed, baud, rate, duration, joints)
+    data, warnings = measured(chosen_bed(word, source, names, quiet=quiet, **options), baud, rate, duration, joints)
     if form == "json":
         say(json.dumps({**data, "warnings": warnings}, indent=2))
     elif not quiet:

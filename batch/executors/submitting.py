@@ -114,13 +114,11 @@ def _hand_over(campaign: Campaign, folder: Folder, count: int, cases: int, optio
     logs = folder.path / "logs"
     logs.mkdir(exist_ok=True)
     log = str(logs.resolve()).replace("%", "%%")  # in the syntax of sbatch
-    name = campaign.output.stem
-    common = [program, "--parsable", f"--job-name=met-{name}", *options]
+    common = [program, "--parsable", f"--job-name=met-{campaign.output.stem}", *options]
     array = ""
     if cases:
         script = _script(folder.path, "share", '"$SLURM_ARRAY_TASK_ID"', shlex.quote(str(tasks.resolve())))
-        words = [*common, f"--array=0-{count - 1}", f"--output={log}/%A_%a.log"]
-        array = _sbatch(words, script, bool(options))
+        array = _sbatch([*common, f"--array=0-{count - 1}", f"--output={log}/%A_%a.log"], script, bool(options))
     script = _script(folder.path, "together")
     after = [f"--dependency=afterany:{array}"] if array else []
     end = _sbatch([*common, *after, f"--output={log}/%A.log"], script, bool(options))

@@ -249,8 +249,7 @@ class Simulation:
 
 def _commanded(commands: Any, paths: Iterable[str]) -> dict[str, str]:
     """The kinds of commands by joint, "" for that of the deck. paths: of values. Raises Problem E435."""
-    example = '["shoulder"]'
-    joints = texts(list(commands) if isinstance(commands, Mapping) else commands, "commands", "E435", example)
+    joints = texts(list(commands) if isinstance(commands, Mapping) else commands, "commands", "E435", '["shoulder"]')
     kinds = [""] * len(joints)
     if isinstance(commands, Mapping):
         kinds = list(texts(list(commands.values()), "commands", "E435", '{"shoulder": "torque"}'))

@@ -163,8 +163,7 @@ class SteppedRun:
         outputs = self._block.outputs[: len(names), :1].T.copy()
         engine.judge(names, outputs)
         by_name = {name: outputs[:, column] for column, name in enumerate(names)}
-        input_values = self._block.inputs[:, :1].T
-        return causes_of(self._prepared.experiment, input_values, by_name)[0]
+        return causes_of(self._prepared.experiment, self._block.inputs[:, :1].T, by_name)[0]
 
     @property
     def metrics(self) -> dict[str, float]:
