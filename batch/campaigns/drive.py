@@ -36,7 +36,8 @@ class Outcome:
 
 
 class Executor(Protocol):
-    """Carries out tasks, `workers` of them at a time."""
+    """Carries out a campaign's tasks, `workers` of them at a time: it is opened on the campaign's folder, given tasks,
+    and asked for their outcomes."""
 
     @property
     def about(self) -> str:
