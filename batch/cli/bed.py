@@ -7,25 +7,9 @@ from typing import Any
 
 import click
 
-from batch.cli.run import SECONDS, measured
+from batch.cli.quantities import SECONDS, Quantity, measured
 from met.cli import NO, YES, FiniteRange, check_options, deck_options, format_option, loudness_options
 from met.diagnostic import Problem
-
-
-class Hertz(click.ParamType):
-    """A rate with its unit: `1 kHz`, `500 Hz`; a bare number is Hz."""
-
-    name = "rate"
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
-        """Read a rate as Hz."""
-        try:
-            hz = measured(value, "Hz")
-        except ValueError:
-            self.fail(f"`{value}` is no rate: write `1 kHz` or `500 Hz`", param, ctx)
-        if not 1.0 <= hz <= 1e5:
-            self.fail(f"`{value}` is no rate to exchange at: 1 Hz to 100 kHz", param, ctx)
-        return hz
 
 
 class Amount(click.ParamType):
@@ -47,6 +31,13 @@ class Amount(click.ParamType):
         return amount
 
 
+EXCHANGES = Quantity(
+    "rate",
+    "Hz",
+    "`1 kHz` or `500 Hz`",
+    suits=lambda hz: 1.0 <= hz <= 1e5,
+    beyond="to exchange at: 1 Hz to 100 kHz",
+)
 PORT = click.option("--port", "word", metavar="[JOINT=]PORT", required=True, help="The port of the bed.")
 BAUD = click.option(
     "--baud",
@@ -118,7 +109,7 @@ def clear(word: str, **options: Any) -> int:
 @click.argument("names", nargs=-1, metavar="[NAME]")
 @PORT
 @BAUD
-@click.option("--rate", type=Hertz(), metavar="RATE", help="Rate of the exchanges [that of the deck, else 1 kHz].")
+@click.option("--rate", type=EXCHANGES, metavar="RATE", help="Rate of the exchanges [that of the deck, else 1 kHz].")
 @click.option(
     "--duration", type=SECONDS, metavar="TIME", default=10.0, show_default="10 s", help="Duration of the measurement."
 )

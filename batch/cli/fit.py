@@ -7,19 +7,21 @@ from typing import Any
 import click
 
 from batch.cli.best import tell
-from batch.cli.instant import Instant
+from batch.cli.quantities import INSTANT
 from batch.cli.residuals import column_option
 from met.cli import NO, YES, deck_options, format_option
 from met.outputs import varies
 
 
-class LogInstant(Instant):
+class LogInstant(click.ParamType):
     """An instant of a log: its file, "" for any log, and s."""
+
+    name = "instant"
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         """Read `LOG=TIME` or `TIME`."""
         log, _, instant = value.rpartition("=")
-        return log, super().convert(instant, param, ctx)
+        return log, INSTANT.convert(instant, param, ctx)
 
 
 @click.command(short_help="Estimate numbers of a deck from logs of the real arm.")

@@ -6,7 +6,7 @@ from typing import Any
 
 import click
 
-from batch.cli.instant import Instant
+from batch.cli.quantities import Quantity
 from met.cli import NO, YES, check_options, deck_options, format_option
 from met.messages.visible import say
 
@@ -18,7 +18,10 @@ EQUILIBRIUM = "write `2 s`; a `linear` block of the run has `at = equilibrium;`,
 @click.argument("name", metavar="[NAME]", required=False)
 @click.option("--of", metavar="LINEAR", help="Answer this `linear` block of the run. [its only one]")
 @click.option(
-    "--at", type=Instant(equilibrium=EQUILIBRIUM), metavar="TIME", help="The instant of the run, such as `2 s`. [0 s]"
+    "--at",
+    type=Quantity("instant", "s", "`2 s` or `250 ms`", equilibrium=EQUILIBRIUM),
+    metavar="TIME",
+    help="The instant of the run, such as `2 s`. [0 s]",
 )
 @click.option(
     "--case", metavar="ID", help="The case of a sweep: the beginning of its id, or its position, as '#7'. [#0]"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import click
 
-from batch.cli.instant import Instant
+from batch.cli.quantities import INSTANT
 from met.cli import YES, loudness_options
 from met.host.streams import kept
 from met.messages.visible import say
@@ -46,7 +46,7 @@ from met.messages.visible import say
 @click.option(
     "--at",
     multiple=True,
-    type=Instant(),
+    type=INSTANT,
     metavar="TIME",
     help="With --arm: an instant, such as `2 s`; may be repeated.",
 )

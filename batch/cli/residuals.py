@@ -7,7 +7,7 @@ from typing import Any, TypeVar
 
 import click
 
-from batch.cli.instant import Instant
+from batch.cli.quantities import INSTANT
 from met.cli import YES, format_option
 from met.messages.visible import line, say
 
@@ -37,7 +37,7 @@ def column_option(face: Face) -> Face:
 @column_option
 @click.option(
     "--zero",
-    type=Instant(),
+    type=INSTANT,
     default="0 s",
     metavar="TIME",
     help="The log's time at which the run begins: '12.5 s'; of a log that is 4 ms late, '4 ms'.  [0 s]",

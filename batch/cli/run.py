@@ -7,31 +7,13 @@ from typing import Any
 
 import click
 
+from batch.cli.quantities import SECONDS
 from batch.formats import endings
 from met.cli import NO, YES, check_options, deck_options, format_option, loudness_options
 from met.messages.visible import line, say
 
 MOST_NAMED = 5
 """Largest number of archives that are named where the given name is unknown."""
-
-
-class Seconds(click.ParamType):
-    """A time with its unit: `90 s`, `5 min`, `1.5 h`; a bare number is seconds."""
-
-    name = "time"
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
-        """Read a time as seconds."""
-        try:
-            seconds = measured(value, "s")
-        except ValueError:
-            self.fail(f"`{value}` is no time: write `90 s`, `5 min` or `1.5 h`", param, ctx)
-        if not 0.0 < seconds < float("inf"):
-            self.fail(f"`{value}` is no time to wait for", param, ctx)
-        return seconds
-
-
-SECONDS = Seconds()
 
 ROWS = click.option(
     "--rows",
@@ -49,21 +31,6 @@ VERIFY = click.option(
     help="Cases to run again with half and a quarter of the step, to estimate the errors of metrics: none, some, "
     "all, or auto, which is some if that is cheap. [auto]",
 )
-
-
-def measured(value: Any, si: str) -> float:
-    """A number with or without a unit, in SI. si: the unit to assume without one. Raises ValueError."""
-    import re
-
-    from met import units
-    from met.unit_parser import parse_unit
-
-    split = re.fullmatch(r"([-+.\deE]*\d\.?)\s*(\D*)", str(value).strip())
-    number, unit = split.groups() if split else ("", "")
-    number_in_si = float(number) * (parse_unit(unit).scale if unit else 1.0)
-    if unit and not units.same(parse_unit(unit).dimension, parse_unit(si).dimension):
-        raise ValueError
-    return number_in_si
 
 
 @click.command(short_help="Run the cases of a deck or a plan into an archive.")
