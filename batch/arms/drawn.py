@@ -15,8 +15,9 @@ from batch.arms.meshes import NO_MESHES, ArmMeshes, arm_meshes, meshes_json
 from batch.arms.placing import INSTANT as EARLY
 from batch.arms.placing import OF_FREE_BASE, POSITION, parameters
 from batch.arms.scene import ArmScene, arm_scene, lacking, scene_json
+from batch.arms.shapes import numbers
 from met.dynamics.kinematics import LinkMotion
-from met.dynamics.spatial import Pose, constant, rotation_quaternion, settled, turn_vector_back
+from met.dynamics.spatial import Pose, is_zero, rotation_quaternion, settled, turn_vector_back
 from met.environments.environment import Environment, Jet, Loads
 from met.frozen import frozen
 from met.integrators.integrator import Motion
@@ -26,7 +27,7 @@ from met.program.cells import answer
 from met.program.courses import TIME
 from met.program.motion.base import ArmWorld, BaseMotion, environment_values, prescribed
 from met.program.system import PARAMETER, ReadCell, System
-from met.trace import Formulas, Graph, Real, Scalar, both, floor, where
+from met.trace import Formulas, Graph, Real, both, floor, where
 from met.vectors import Vector, scale
 
 RATE = "qd"
@@ -90,7 +91,7 @@ class ActingOnArm:
 class RecordedWorld(ArmWorld):
     """The world of environment models, made from a run's recorded signals; payloads in flight too."""
 
-    def __init__(self, system: System, graph: Graph, memory: Mapping[str, Any], time: Real, read: ReadCell) -> None:
+    def __init__(self, system: System, graph: Graph, time: Real, read: ReadCell) -> None:
         def three(name: str) -> Vector:
             x, y, z = (graph.input(f"{name}.{axis}") for axis in "xyz")
             return x, y, z
@@ -125,12 +126,12 @@ def acting_on(experiment: Experiment, scene: ArmScene, recorded: Collection[str]
     """The loads on the arm of a scene. recorded: existing channels; loads that need others are listed in `not_drawn`"""
     system, graph = System(experiment), Graph()
     varied = {coordinate.path: graph.input(coordinate.path) for coordinate in experiment.cases.coordinates}
-    values = {path: _settled(value) for path, value in parameters(experiment, varied).items()}
+    values = {path: settled(value) for path, value in parameters(experiment, varied).items()}
     memory: dict[str, Any] = {PARAMETER + path: value for path, value in values.items()}
     system.keep_tree(memory.__getitem__, memory.__setitem__)
     step = system.structure.schedule.step
     time = floor(graph.input(TIME) / step + EARLY) * step
-    world = RecordedWorld(system, graph, memory, time, memory.__getitem__)
+    world = RecordedWorld(system, graph, time, memory.__getitem__)
     known = {TIME, *varied, *recorded}
     joints = {joint.name: joint for joint in system.joints}
 
@@ -145,7 +146,7 @@ def acting_on(experiment: Experiment, scene: ArmScene, recorded: Collection[str]
         loads = answer(owner, model.loads, p, world)
         own = [(ActingArrow(_kind(model), name, unit), x) for unit, x in _arrows(loads, world, joints, values)]
         gas = [] if model.jet is None else [(name, _jet(answer(owner, model.jet, p, world), world))]
-        gas_formulas = Formulas.of(graph, [x for _, numbers in (*own, *gas) for x in numbers])
+        gas_formulas = Formulas.of(graph, [x for _, values_of in (*own, *gas) for x in values_of])
         if missing := set(gas_formulas.inputs) - known:
             not_drawn.append(NotDrawn("load", name, _signals(missing, system.joints)))
         elif nodes + (more := _size(gas_formulas)) > MOST_NODES:
@@ -158,14 +159,14 @@ def acting_on(experiment: Experiment, scene: ArmScene, recorded: Collection[str]
     number = {body.name: place for place, body in enumerate(scene.bodies)}
     payloads: list[tuple[PayloadInHand, list[Real]]] = []
     for payload in system.flying:
-        held = world.position(payload.link, _three(values, f"payloads.{payload.name}.at"))
+        held = world.position(payload.link, numbers(values, f"payloads.{payload.name}.at"))
         stage = _stage(payload, graph.input(TIME), values, INSTANT * step)
         payloads.append((PayloadInHand(payload.name, payload.link, number.get(payload.name, -1)), [stage, *held]))
         if payload.name not in number:
             signals = (f"payloads.{payload.name}.position", f"payloads.{payload.name}.orientation")
             not_drawn.append(NotDrawn("payload", payload.name, signals))
 
-    outputs = [x for group in (arrows, jets, payloads) for _, numbers in group for x in numbers]
+    outputs = [x for group in (arrows, jets, payloads) for _, values_of in group for x in values_of]
     formulas = Formulas.of(graph, outputs)
     return ActingOnArm(
         formulas=formulas,
@@ -206,15 +207,15 @@ def _arrows(
         if world.is_ground(force.link):
             continue
         point = world.position(force.link, force.point)
-        if not _nothing(force.force):
+        if not all(map(is_zero, force.force)):
             yield "N", [*point, *force.force]
-        if not _nothing(force.moment):
+        if not all(map(is_zero, force.moment)):
             yield "N*m", [*point, *force.moment]
     for name, torque in loads.torques.items():
         joint = joints[name]
-        axis, pivot = (_three(values, f"{name}.{part}") for part in ("axis", "pivot"))
+        axis, pivot = (numbers(values, f"{name}.{part}") for part in ("axis", "pivot"))
         along = scale(torque, world.to_world(joint.child, axis))
-        if not _nothing(along):
+        if not all(map(is_zero, along)):
             yield "N" if joint.kind == "prismatic" else "N*m", [*world.position(joint.child, pivot), *along]
 
 
@@ -237,19 +238,6 @@ def _stage(payload: Payload, time: Real, values: Mapping[str, Any], early: float
 def _size(formulas: Formulas) -> int:
     """The number of operations and entries of tables in formulas."""
     return sum(len(node[2]) if node[0] == "gather" else 1 for node in formulas.nodes)
-
-
-def _three(values: Mapping[str, Any], path: str) -> Vector:
-    x, y, z = (values.get(f"{path}.{part}", 0.0) for part in "xyz")
-    return x, y, z
-
-
-def _nothing(vector: Vector) -> bool:
-    return all(constant(x) and _settled(x) == 0.0 for x in vector)
-
-
-def _settled(value: Any) -> Any:
-    return settled(value) if isinstance(value, Scalar) else value
 
 
 def _signals(missing: Collection[str], joints: Sequence[Joint]) -> tuple[str, ...]:
@@ -316,8 +304,7 @@ def drawn_json(arm: DrawnArm) -> dict[str, Any]:
         data["meshes"] = arm.meshes.words
     if arm.acting is not None:
         data["acting"] = acting_json(arm.acting) | {"columns": columns(arm.acting.channels)}
-    visible_data: dict[str, Any] = visible_texts(data)
-    return visible_data
+    return visible_texts(data)
 
 
 def visible_texts(value: Any) -> Any:

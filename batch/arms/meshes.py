@@ -70,8 +70,7 @@ def _stl(data: bytes) -> np.ndarray:
     count = int.from_bytes(data[80:STL_HEAD], "little") if len(data) >= STL_HEAD else -1
     if 0 <= count == (len(data) - STL_HEAD) / STL_TRIANGLE:
         kind = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
-        corners: np.ndarray = np.frombuffer(data, kind, count, STL_HEAD)["corners"]
-        return corners
+        return np.frombuffer(data, kind, count, STL_HEAD)["corners"]
     if not data.lstrip()[:5].lower() == b"solid":
         raise MeshFault(f"is {len(data):,} bytes long, which no STL of {max(count, 0):,} triangles is")
     data = _STL_NAME.sub(b"", data)  # a name may have any words
@@ -103,8 +102,7 @@ def _obj(data: bytes) -> np.ndarray:
         for second, third in pairwise(places[1:]):
             corners += (places[0], second, third)
         _limit(len(corners) // 3)
-    triangles_of_faces: np.ndarray = points[np.array(corners, np.int64).reshape(-1, 3)]
-    return triangles_of_faces
+    return points[np.array(corners, np.int64).reshape(-1, 3)]
 
 
 def _numbers(words: list[Any]) -> np.ndarray:

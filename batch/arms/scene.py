@@ -15,11 +15,11 @@ from batch.arms.placing import OF_FREE_BASE, POSITION, parameters, world_poses
 from batch.arms.shapes import ArmNumbers, drawn, numbers, shape_of, shapes
 from met.dynamics.spatial import HERE, IDENTITY, Pose, Vector, compose, rotation_quaternion, scale, settled
 from met.frozen import frozen
-from met.plan import BASE, Experiment, Joint, Link, Payload
+from met.plan import BASE, Experiment, Link, Payload
 from met.program.courses import TIME
 from met.program.motion.base import prescribed
 from met.program.system import PARAMETER, System
-from met.trace import Formulas, Graph, Scalar
+from met.trace import Formulas, Graph
 
 LIMB, LIMB_OF_LINK = 0.03, 0.32
 """Radius of a limb without a size of its own: at most this share of the arm's reach, and of its middle link's
@@ -82,7 +82,7 @@ def arm_scene(experiment: Experiment, recorded: Sequence[str]) -> ArmScene:
     structure = experiment.structure
     graph = Graph()
     varied = {coordinate.path: graph.input(coordinate.path) for coordinate in experiment.cases.coordinates}
-    values = {path: _settled(value) for path, value in parameters(experiment, varied).items()}
+    values = {path: settled(value) for path, value in parameters(experiment, varied).items()}
     first = parameters(
         experiment, {coordinate.path: coordinate.values[0] for coordinate in experiment.cases.coordinates}
     )
@@ -124,7 +124,6 @@ def arm_scene(experiment: Experiment, recorded: Sequence[str]) -> ArmScene:
     names = list(dict.fromkeys([BASE, *(body.name for body in bodies)]))
     number = {name: place for place, name in enumerate(names)}
     moving = {joint.name: place for place, joint in enumerate(joints)}
-    own = moving | _rigid_with(structure.joints, moving)
     listed = [(number[name], shape) for name, several in shapes_of.items() for shape in several]
     outputs: list[Any] = [x for name in names for x in (*(e for row in world[name].R for e in row), *world[name].p)]
     outputs += [x for _, shape in listed for vector in (shape.middle, shape.axis, shape.size) for x in vector]
@@ -132,7 +131,7 @@ def arm_scene(experiment: Experiment, recorded: Sequence[str]) -> ArmScene:
     outputs += compose(world[tip], Pose(IDENTITY, _end(arm, tip))).p
     return ArmScene(
         tuple(ArmBody(name, number.get(carriers.get(name, ""), -1)) for name in names),
-        tuple(SceneShape(b, shape.kind, shape.role, own.get(shape.joint, -1)) for b, shape in listed),
+        tuple(SceneShape(b, shape.kind, shape.role, moving.get(shape.joint, -1)) for b, shape in listed),
         Formulas.of(graph, outputs),
         tuple(channels),
         tuple(joint.name for joint in joints),
@@ -169,10 +168,6 @@ def scene_json(scene: ArmScene) -> dict[str, Any]:
     }
 
 
-def _settled(value: Any) -> Any:
-    return settled(value) if isinstance(value, Scalar) else value
-
-
 def _channels(name: str, parts: str) -> list[str]:
     return [f"{name}.{part}" for part in parts]
 
@@ -182,11 +177,6 @@ def _recorded_pose(graph: Graph, position: str, orientation: str) -> Pose:
     x, y, z = (graph.input(name) for name in _channels(position, "xyz"))
     turn = [graph.input(name) for name in _channels(orientation, "wxyz")]
     return Pose(rotation_quaternion(turn[0], turn[1], turn[2], turn[3]), (x, y, z))
-
-
-def _rigid_with(joints: Sequence[Joint], moving: Mapping[str, int]) -> dict[str, int]:
-    """The number -1 for each fixed joint: it does not move, and is drawn as a part of its link."""
-    return {joint.name: -1 for joint in joints if joint.name not in moving}
 
 
 # Sizes, by the numbers of the first case
@@ -226,8 +216,8 @@ def _end(arm: ArmNumbers, name: str) -> Vector:
         far = {"sphere": 0.0, "box": sizes.get(f"size_{'xyz'[along]}", 0.0)}.get(kind, sizes.get("length", 0.0))
         return (far * float(along == 0), far * float(along == 1), far * float(along == 2))
     if link is not None and link.root:
-        return scale(2.0, numbers(arm, f"links.{name}.com"))
-    return numbers(arm, f"{carried[-1].name}.at" if carried else f"links.{name}.com")
+        return scale(2.0, numbers(arm.values, f"links.{name}.com"))
+    return numbers(arm.values, f"{carried[-1].name}.at" if carried else f"links.{name}.com")
 
 
 def _limb(experiment: Experiment, first: Mapping[str, float], reach: float) -> float:

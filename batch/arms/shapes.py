@@ -13,7 +13,7 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Literal
 
-from met.dynamics.spatial import IDENTITY, ZERO, Pose, Real, Vector, compose, constant, rotation_rpy, scale, sub
+from met.dynamics.spatial import IDENTITY, ZERO, Pose, Real, Vector, compose, is_zero, rotation_rpy, scale, sub
 from met.frozen import frozen
 from met.plan import BASE, Experiment, Joint, Link, Payload
 from met.plan.closing import of_joints
@@ -74,12 +74,12 @@ def shapes(arm: ArmNumbers, bodies: Sequence[Link | Payload]) -> dict[str, list[
     ends: dict[str, list[Vector]] = {}  # of lines, by the body from whose origin they are drawn
     for joint in structure.joints:
         carried.setdefault(joint.parent, []).append(joint)
-        ends.setdefault(joint.parent, []).append(numbers(arm, f"{joint.name}.at"))
+        ends.setdefault(joint.parent, []).append(numbers(arm.values, f"{joint.name}.at"))
     pins: dict[str, list[ArmShape]] = {}
     radius = MASS * arm.size
     for loop in of_joints(structure.joints).values():
-        ends.setdefault(loop.to, []).append(numbers(arm, f"{loop.name}.to_at"))
-        ends.setdefault(loop.link, []).append(pin := numbers(arm, f"{loop.name}.at"))
+        ends.setdefault(loop.to, []).append(numbers(arm.values, f"{loop.name}.to_at"))
+        ends.setdefault(loop.link, []).append(pin := numbers(arm.values, f"{loop.name}.at"))
         ball = ArmShape("sphere", "joint", pin, (0.0, 0.0, 1.0), (radius, radius, radius))
         pins.setdefault(loop.link, []).append(ball)
     carrier = {joint.child: joint for joint in structure.joints}
@@ -142,7 +142,7 @@ def _solid(arm: ArmNumbers, body: Link | Payload, role: Literal["link", "payload
     axis: Vector = (float(along == 0), float(along == 1), float(along == 2))
     inertia = arm.experiment.parameters.get(f"{head(body)}.inertia.xx")
     if inertia is not None and inertia.origin.kind != "deck":
-        middle = numbers(arm, f"{head(body)}.com")
+        middle = numbers(arm.values, f"{head(body)}.com")
     else:
         lengths = {"sphere": 0.0, "box": sizes.get(f"size_{'xyz'[along]}", 0.0)}
         middle = scale(lengths.get(kind, sizes.get("length", 0.0)) / 2.0, axis)
@@ -161,7 +161,7 @@ def _bare(
     mass."""
     if ends:
         return [line(role, ZERO, end) for end in ends]
-    com, radius = numbers(arm, f"{head(body)}.com"), MASS * arm.size
+    com, radius = numbers(arm.values, f"{head(body)}.com"), MASS * arm.size
     return [line(role, ZERO, com), ArmShape("sphere", role, com, (0.0, 0.0, 1.0), (radius, radius, radius))]
 
 
@@ -169,7 +169,7 @@ def _joint(arm: ArmNumbers, joint: Joint) -> list[ArmShape]:
     """The shape of the joint that carries a link, in the link's frame."""
     radius, length = JOINT_RADIUS * arm.size, JOINT_LENGTH * arm.size
     if joint.kind == "revolute":
-        axis, pivot = numbers(arm, f"{joint.name}.axis"), numbers(arm, f"{joint.name}.pivot")
+        axis, pivot = numbers(arm.values, f"{joint.name}.axis"), numbers(arm.values, f"{joint.name}.pivot")
         return [ArmShape("cylinder", "joint", pivot, axis, (radius, radius, length), joint.name)]
     if joint.kind == "prismatic":
         return [ArmShape("box", "joint", ZERO, (0.0, 0.0, 1.0), (2 * radius, 2 * radius, 2 * radius), joint.name)]
@@ -181,8 +181,8 @@ def _rails(arm: ArmNumbers, carried: Sequence[Joint]) -> list[ArmShape]:
     out = []
     for joint in carried:
         if joint.name in arm.travel:
-            axis, turn = (numbers(arm, f"{joint.name}.{name}") for name in ("axis", "rpy"))
-            frame = Pose(rotation_rpy(*turn), numbers(arm, f"{joint.name}.at"))
+            axis, turn = (numbers(arm.values, f"{joint.name}.{name}") for name in ("axis", "rpy"))
+            frame = Pose(rotation_rpy(*turn), numbers(arm.values, f"{joint.name}.at"))
             low, high = (compose(frame, Pose(IDENTITY, scale(q, axis))).p for q in arm.travel[joint.name])
             out.append(line("rail", low, high))
     return out
@@ -193,12 +193,12 @@ def line(role: Literal["link", "payload", "joint", "rail"], begin: Vector, end: 
     return ArmShape("line", role, begin, sub(end, begin))
 
 
-def numbers(arm: ArmNumbers, path: str) -> Vector:
-    """The three numbers of a vector parameter; zeros where it does not exist."""
-    x, y, z = (arm.values.get(f"{path}.{part}", 0.0) for part in "xyz")
+def numbers(values: Mapping[str, Real], path: str) -> Vector:
+    """The three numbers of a vector parameter among a case's parameters by path; zeros where it does not exist."""
+    x, y, z = (values.get(f"{path}.{part}", 0.0) for part in "xyz")
     return (x, y, z)
 
 
 def _is_visible(shape: ArmShape) -> bool:
     """False for a line that has no length in any case."""
-    return shape.kind != "line" or not all(constant(x) and x == 0.0 for x in shape.axis)
+    return shape.kind != "line" or not all(map(is_zero, shape.axis))
