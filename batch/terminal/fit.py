@@ -218,7 +218,7 @@ def as_data(question: FitQuestion, answer: FitAnswer) -> dict[str, Any]:
         }
         for place, path in enumerate(question.paths)
     ]
-    data: dict[str, Any] = {
+    data = {
         "certain": is_certain(question, answer),
         "doubts": [line.strip() for all_doubt in _all_doubts(question, answer) for line in all_doubt],
         "parameters": parameters,
@@ -229,8 +229,7 @@ def as_data(question: FitQuestion, answer: FitAnswer) -> dict[str, Any]:
         "logs": _comparisons(question.runs, zip(answer.before, answer.after, strict=True)),
         "predicted": _comparisons(question.predicted, answer.predicted),
     }
-    plain: dict[str, Any] = finite(data)
-    return plain
+    return finite(data)
 
 
 def identifiable_data(question: FitQuestion, known: Known, promised: Sequence[Promise]) -> dict[str, Any]:
@@ -241,7 +240,7 @@ def identifiable_data(question: FitQuestion, known: Known, promised: Sequence[Pr
             question.paths, question.start, known.deviation, known.alone, known.verdict, strict=True
         )
     ]
-    data: dict[str, Any] = {
+    data = {
         "parameters": parameters,
         "rank": known.rank,
         "condition": known.condition,
@@ -258,8 +257,7 @@ def identifiable_data(question: FitQuestion, known: Known, promised: Sequence[Pr
         ],
         "together": _as_paths(question, known),
     }
-    plain: dict[str, Any] = finite(data)
-    return plain
+    return finite(data)
 
 
 def _comparisons(runs: Sequence[Any], pairs: Any) -> list[dict[str, Any]]:

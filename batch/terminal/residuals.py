@@ -17,8 +17,7 @@ SHOWN = 8
 
 def as_data(comparison: Comparison) -> dict[str, Any]:
     """Plain data; a number that is not finite is null."""
-    data: dict[str, Any] = finite(dataclasses.asdict(comparison))
-    return data
+    return finite(dataclasses.asdict(comparison))
 
 
 def residual_lines(comparison: Comparison) -> Iterator[str]:

@@ -22,8 +22,7 @@ def as_data(sensitivity: Sensitivity) -> dict[str, Any]:
         {"input": name, **dataclasses.asdict(share)}
         for name, share in zip(sensitivity.inputs, sensitivity.shares, strict=False)
     ]
-    data: dict[str, Any] = finite({**plain, "inputs": inputs})
-    return data
+    return finite({**plain, "inputs": inputs})
 
 
 def sensitivity_lines(sensitivity: Sensitivity) -> list[str]:

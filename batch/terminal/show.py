@@ -218,11 +218,11 @@ def as_json(
 def heading(group: ArchiveGroup, width: int) -> list[str]:
     """Lines that describe the run."""
     a = group.attributes
-    count = f"{group.run:,} case{'s' if group.run != 1 else ''}"
+    cases_text = count(group.run, "case")
     if group.run < a["cases_in_table"]:
-        count += f" of {'at most ' * ('until_shown' in a)}{a['cases_in_table']:,}"
+        cases_text += f" of {'at most ' * ('until_shown' in a)}{a['cases_in_table']:,}"
     text = (
-        f"{count}, {a['duration_s']:g} s, {a['integrator']} at {a['dynamics_hz']:g} Hz, recorded at "
+        f"{cases_text}, {a['duration_s']:g} s, {a['integrator']} at {a['dynamics_hz']:g} Hz, recorded at "
         f"{a['record_hz']:g} Hz, arm {a['arm']}, velocity products {a['velocity_products']}"
     )
     indent = len(group.name) + 2

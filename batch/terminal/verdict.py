@@ -17,6 +17,7 @@ from batch.queries.search_result import SearchResult
 from batch.queries.step_errors.figures import HINT
 from batch.queries.summary import Summary, as_json, finite
 from batch.terminal.show import verdict, warning_lines
+from ic.printing.columns import count
 from ic.printing.columns import size as size_text
 from ic.sweeps.confidences import OF_CASES
 from met.diagnostic import Diagnostic
@@ -60,14 +61,14 @@ def _part_lines(part: CampaignPart, verbose: bool) -> Iterator[str]:
     """Lines about an experiment before it runs: its cases, and the histories to be kept."""
     experiment = part.experiment
     schedule = experiment.structure.schedule
-    count, whole = len(part.rows), experiment.cases.count
+    own, whole = len(part.rows), experiment.cases.count
     if part.searches and experiment.search is not None:
-        count = whole = part.most
-    cases = f"{count:,} case{'s' if count != 1 else ''}" + (f" of {whole:,}" if count < whole else "")
-    if count == 1 and whole > 1:
+        own = whole = part.most
+    cases = count(own, "case") + (f" of {whole:,}" if own < whole else "")
+    if own == 1 and whole > 1:
         whole_text = f"`{experiment.sweep}`" if experiment.sweep else f"{whole:,}"
         cases = f"case #{experiment.cases.table[part.rows[0]]} of {whole_text}"
-    early = part.open_ended and count == whole
+    early = part.open_ended and own == whole
     if early:
         cases = f"at most {cases}"
     steps = schedule.ticks // schedule.dynamics
@@ -210,7 +211,7 @@ def _why_not(summaries: tuple[Summary, ...]) -> str:
     """The reasons why a run's outcome is not good, in words."""
     failed = sum(summary.failed for summary in summaries)
     missed = [r for summary in summaries for r in summary.requirements if not r.ok]
-    parts = [f"{failed:,} case{'s' if failed != 1 else ''} failed"] if failed else []
+    parts = [f"{count(failed, 'case')} failed"] if failed else []
     if missed:
         parts.append("not met everywhere: " + ", ".join(dict.fromkeys(r.text for r in missed)))
     if untrue := [step_error.text for summary in summaries for step_error in summary.untrue]:

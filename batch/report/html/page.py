@@ -11,6 +11,7 @@ from batch.report.html import blocks, changes, designs, inlined, tables
 from batch.report.html.inlined import page_head
 from batch.report.html.markup import Child, Html, el, join, lines
 from batch.report.html.payload import modules_script, script_json, section_data
+from ic.printing.columns import count
 
 GENERATOR = "MET report"
 """The name in a page's `generator` that marks it as MET's, so that it may be overwritten."""
@@ -244,8 +245,12 @@ def _designs(number: int, answer: DesignAnswer, head: str) -> Html:
 def _notes(notes: Sequence[str]) -> Html | None:
     if not notes:
         return None
-    summary = f"{len(notes)} note{'s' if len(notes) != 1 else ''} of the compiler"
-    return el("details", el("summary", summary), [el("p", note) for note in notes], cls="notes")
+    return el(
+        "details",
+        el("summary", f"{count(len(notes), 'note')} of the compiler"),
+        [el("p", note) for note in notes],
+        cls="notes",
+    )
 
 
 ABOUT_BEST = "Those that meet all that is required and stay furthest from the limit that is nearest to them."
@@ -267,7 +272,7 @@ def _parameters(report: Report, anchors: blocks.Anchors) -> Html:
     for number, section in enumerate(report.sections):
         if not section.parameters:
             continue
-        count = f"{len(section.parameters):,} parameters and settings"
+        words = f"{len(section.parameters):,} parameters and settings"
         of_section = f" of {section.name}" if len(report.sections) > 1 else ""
         search = el(
             "label",
@@ -285,7 +290,7 @@ def _parameters(report: Report, anchors: blocks.Anchors) -> Html:
         out.append(
             el(
                 "details",
-                el("summary", f"{count}{of_section}, each with the line of the deck that wrote it"),
+                el("summary", f"{words}{of_section}, each with the line of the deck that wrote it"),
                 search,
                 tables.parameters(section.parameters, anchors),
                 el("p", role="status", cls="said found"),
