@@ -33,8 +33,7 @@ def draw(linearized: Linearized, output: Path) -> None:
     of outputs to steps of inputs. Raises Problem E450 where there is neither, E305, E326."""
     import matplotlib
 
-    style: Any = STYLE
-    with matplotlib.rc_context(style):
+    with matplotlib.rc_context(STYLE):
         places.save(figure(linearized), output)
 
 
@@ -193,8 +192,7 @@ def draw_locus(question: LinearQuestion, answers: Sequence[Linearized | str], ou
     """Draw the poles of all cases that have an answer. Raises Problem E450 where there are none, E305, E326."""
     import matplotlib
 
-    style: Any = STYLE
-    with matplotlib.rc_context(style):
+    with matplotlib.rc_context(STYLE):
         places.save(locus_figure(question, answers), output)
 
 

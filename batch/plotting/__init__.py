@@ -11,9 +11,9 @@ from __future__ import annotations
 import contextlib
 import logging
 import os
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from met.outputs import path_of
 
@@ -91,14 +91,11 @@ def draw(
 
     target, sheet = path_of(output), sheet or PictureSheet()
     groups = groups_named(archive, (run,) if run else ())
-    group = _with_case(groups, cases[0]) if cases else groups[0]
+    group = _with_case(groups, cases[0] if cases else "")
     place.check(target)
     [pool] = [pool for pool in pools(groups) if group in pool.groups]
     wanted = plot_request(group, pool, names, cases, over)
-    matplotlib = _matplotlib()
-    with matplotlib.rc_context():
-        matplotlib.rcdefaults()  # a matplotlibrc in the working folder, which might start TeX, is ignored
-        matplotlib.rcParams.update(sheet.style)
+    with _styled(sheet):
         if wanted.histories:
             other_group = None if against is None else beside(archive, [group], against)[0]
             figure = histories.Histories(archive, group, wanted.signals, cases, sheet, other_group).draw()
@@ -127,31 +124,33 @@ def draw_arm(
 
     target, sheet = path_of(output), sheet or PictureSheet()
     archive.need_every_row("a picture of an arm")
-    groups = groups_named(archive, (run,) if run else ())
-    group = _with_case(groups, case) if case else groups[0]
+    group = _with_case(groups_named(archive, (run,) if run else ()), case)
     place.check(target)
-    matplotlib = _matplotlib()
-    with matplotlib.rc_context():
-        matplotlib.rcdefaults()  # as in `draw`
-        matplotlib.rcParams.update(sheet.style)
+    with _styled(sheet):
         place.save(arm_picture(archive, group, case, at, sheet), target)
     return target
 
 
 def _with_case(groups: Sequence[ArchiveGroup], case: str) -> ArchiveGroup:
-    """The first experiment that has a case; where none has it, the first of all, which then reports it."""
+    """The first experiment that has a case; where none has it, the first of all, which then reports it. case: "" for
+    any"""
     from met.diagnostic import Problem
 
-    for group in groups:
+    for group in groups if case else ():
         with contextlib.suppress(Problem):
             group.find_case(case)
             return group
     return groups[0]
 
 
-def _matplotlib() -> Any:
-    """matplotlib without pyplot, and without its messages about font caches."""
+@contextlib.contextmanager
+def _styled(sheet: PictureSheet) -> Iterator[None]:
+    """A block in which matplotlib has the settings of a sheet. A matplotlibrc in the working folder, which might start
+    TeX, is ignored, and messages about font caches are not said."""
     logging.getLogger("matplotlib").setLevel(logging.ERROR)
     import matplotlib
 
-    return matplotlib
+    with matplotlib.rc_context():
+        matplotlib.rcdefaults()
+        matplotlib.rcParams.update(sheet.style)
+        yield

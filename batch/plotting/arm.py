@@ -100,15 +100,14 @@ def viewpoint(pictured: Sequence[PicturedSolid], aspect: float) -> Viewpoint:
     spread = np.cov(points.T, bias=True)
     across = float(spread[0, 0] + spread[1, 1])
     elevation = HIGH if spread[2, 2] < FLAT * across else LOW
-    best, axes = -1.0, _axes(AZIMUTH, elevation)
-    for number in range(36):
-        azimuth = AZIMUTH + number * math.pi / 18.0
-        right, up, back = _axes(azimuth, elevation)
-        area = float(np.linalg.det(np.stack([right, up]) @ spread @ np.stack([right, up]).T))
-        area += 1e-3 * (1.0 + math.cos(azimuth - AZIMUTH)) * across**2
-        if area > best:
-            best, axes = area, (right, up, back)
-    right, up, back = axes
+
+    def area(azimuth: float) -> float:
+        """The area over which the solids are spread as seen from this azimuth; near `AZIMUTH` it counts for more."""
+        plane = np.stack(_axes(azimuth, elevation)[:2])
+        return float(np.linalg.det(plane @ spread @ plane.T)) + 1e-3 * (1.0 + math.cos(azimuth - AZIMUTH)) * across**2
+
+    azimuth = max((AZIMUTH + number * math.pi / 18.0 for number in range(36)), key=area)
+    right, up, back = _axes(azimuth, elevation)
     middle = [
         (float(np.min(points @ axis - radii)) + float(np.max(points @ axis + radii))) / 2.0 for axis in (right, up)
     ]

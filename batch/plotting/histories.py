@@ -361,7 +361,7 @@ def _case_label(group: ArchiveGroup, position: int) -> str:
 
 def _case_title(group: ArchiveGroup) -> str:
     """The title of the legend: the names of its values, one a line."""
-    return " ·\n".join(f"{v.name}  ({deck_unit(v)[1]})" if deck_unit(v)[1] else v.name for v in _differing(group))
+    return " ·\n".join(layout.with_unit(v.name, deck_unit(v)[1]) for v in _differing(group))
 
 
 # Panels

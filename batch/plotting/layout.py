@@ -20,7 +20,7 @@ COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#0
 
 INK, FAINT, LIGHT = "#22282e", "#8a939c", "#e4e7ea"
 
-STYLE: dict[str, Any] = {
+STYLE: Any = {
     "font.family": "DejaVu Sans",
     "text.color": INK,
     "axes.labelcolor": INK,
@@ -91,7 +91,7 @@ class PictureSheet:
         return self.dpi or (PAPER_DPI if self.paper else SCREEN_DPI)
 
     @property
-    def style(self) -> dict[str, Any]:
+    def style(self) -> Any:
         """The settings of matplotlib for this sheet."""
         thin = {"lines.linewidth": 1.1, "axes.linewidth": 0.6, "grid.linewidth": 0.5} if self.paper else {}
         dots = {"figure.dpi": self.resolution, "savefig.dpi": self.resolution}
@@ -216,6 +216,11 @@ def _grow(figure: Any, sheet: PictureSheet, lines: float) -> None:
     """Enlarge a picture on paper by further lines, unless its height is given."""
     if sheet.paper and sheet.height is None:
         figure.set_figheight(figure.get_figheight() + lines * LINE * sheet.small / 72)
+
+
+def with_unit(label: str, unit: str) -> str:
+    """The label of an axis: `settle  (s)`."""
+    return f"{label}  ({unit})" if unit else label
 
 
 def two_lines(label: str, most: int = 16) -> str:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -52,8 +51,7 @@ def draw(title: str, panels: Sequence[MeasuredPanel], output: Path) -> None:
     import matplotlib
     from matplotlib.figure import Figure
 
-    style: Any = STYLE
-    with matplotlib.rc_context(style):
+    with matplotlib.rc_context(STYLE):
         drawn = panels[:MOST_CHANNELS]
         figure = Figure(figsize=(11.0, 1.5 * len(drawn) + 0.9), dpi=144, layout="constrained")
         more = f", {len(panels) - len(drawn)} more channels are not drawn" if len(panels) > len(drawn) else ""

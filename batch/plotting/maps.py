@@ -71,10 +71,8 @@ def plan(x: CaseColumn, y: CaseColumn, third: CaseColumn | None, other: tuple[st
     return MapLayout(across, up, cells, filled, several, other)
 
 
-def draw(
-    sheet: PictureSheet, map_layout: MapLayout, metrics: Sequence[MapMetric], third: CaseColumn | None
-) -> tuple[Any, list[list[Any]]]:
-    """The figure and its axes; its heading is left to the caller."""
+def draw(sheet: PictureSheet, map_layout: MapLayout, metrics: Sequence[MapMetric], third: CaseColumn | None) -> Any:
+    """The figure of the maps of some metrics; its heading is left to the caller."""
     every = np.ones(len(map_layout.cells), bool)
     if third is None:
         wide = int(sheet.width / WIDEST) if sheet.width else 2 if len(metrics) < 5 else 3
@@ -98,7 +96,7 @@ def draw(
             _maps(figure, row, metric, map_layout, [named.places == index for index in range(columns)], sheet)
     _sides(axes, map_layout, sheet)
     layout.legend(figure, _marks(metrics, map_layout), sheet, below=True)
-    return figure, axes
+    return figure
 
 
 def description(map_layout: MapLayout, metrics: Sequence[MapMetric], third: CaseColumn | None) -> str:
@@ -145,26 +143,19 @@ def _values(metric: MapMetric, map_layout: MapLayout) -> np.ndarray:
     return metric.values if map_layout.other is None else metric.difference
 
 
-@frozen
-class ColourScale:
-    """The colour of each value; `reach`: the range of the colours, None where no value is finite."""
-
-    norm: Any
-    reach: Reach | None
-
-
-def _tones(metric: MapMetric, map_layout: MapLayout, values: np.ndarray) -> ColourScale:
-    """The colours of a metric's values, [case], logarithmic where they span factors."""
+def _tones(metric: MapMetric, map_layout: MapLayout, values: np.ndarray) -> tuple[Any, Reach | None]:
+    """The matplotlib norm that gives a metric's values, [case], their colours, logarithmic where they span factors; and
+    how far the colours reach, None where no value is finite."""
     from matplotlib.colors import LogNorm, Normalize
 
     limits = [limit.value for limit in metric.column.limits] if map_layout.other is None else []
     far = reach(values, limits, parting=map_layout.other is not None)
     if far is None:
-        return ColourScale(Normalize(0.0, 1.0), None)
+        return Normalize(0.0, 1.0), None
     if far.low == far.high:
         room = 0.05 * (abs(far.low) or 1.0)
-        return ColourScale(Normalize(far.low - room, far.high + room), far)
-    return ColourScale((LogNorm if far.log else Normalize)(far.low, far.high), far)
+        return Normalize(far.low - room, far.high + room), far
+    return (LogNorm if far.log else Normalize)(far.low, far.high), far
 
 
 def _colours(map_layout: MapLayout) -> Any:
@@ -182,19 +173,16 @@ def _bar(
     metric: MapMetric,
     map_layout: MapLayout,
     sheet: PictureSheet,
-    tones: ColourScale,
+    far: Reach,
 ) -> None:
-    """Draw the colour bar, pointed where values lie beyond it, with their number."""
-    far = tones.reach
-    if far is None:
-        return
+    """Draw the colour bar, pointed where values lie beyond it, with their number. far: how far its colours reach"""
     ends = {(False, False): "neither", (True, False): "min", (False, True): "max", (True, True): "both"}
     extend = ends[far.below > 0, far.above > 0]
     bar = figure.colorbar(mapped, ax=list(axes), pad=0.02, aspect=16, extend=extend, extendfrac=0.05)
     label = metric.label
     if map_layout.other is not None:
-        unit = f"  ({metric.column.unit})" if metric.column.unit else ""
-        label = f"{metric.column.label}: {map_layout.other[0]} − {map_layout.other[1]}{unit}"
+        label = f"{metric.column.label}: {map_layout.other[0]} − {map_layout.other[1]}"
+        label = layout.with_unit(label, metric.column.unit)
     lines = [layout.two_lines(label, 26), *(text for text in reversed(far.beyond_texts) if text)]
     bar.set_label("\n".join(lines), fontsize=sheet.small)
     bar.outline.set_visible(False)
@@ -232,9 +220,8 @@ def _maps(
             )
             for part in parts
         ]
-        tones = _tones(metric, map_layout, np.concatenate([cell_values.values for cell_values in picked]))
-    else:
-        tones = _tones(metric, map_layout, values)
+        values = np.concatenate([cell_values.values for cell_values in picked])
+    norm, far = _tones(metric, map_layout, values)
     mapped = None
     for number, (ax, part) in enumerate(zip(axes, parts, strict=True)):
         ax.grid(False)
@@ -245,10 +232,11 @@ def _maps(
                 getattr(ax, f"set_{name}scale")("log")
             getattr(ax, f"set_{name}lim")(side.edges[0], side.edges[-1])
         if map_layout.filled:
-            mapped = cells.draw(ax, picked[number], map_layout.x, map_layout.y, _colours(map_layout), tones.norm, sheet)
+            mapped = cells.draw(ax, picked[number], map_layout.x, map_layout.y, _colours(map_layout), norm, sheet)
         else:
-            mapped = _points(ax, metric, map_layout, part, tones.norm)
-    _bar(figure, mapped, axes, metric, map_layout, sheet, tones)
+            mapped = _points(ax, metric, map_layout, part, norm)
+    if far is not None:
+        _bar(figure, mapped, axes, metric, map_layout, sheet, far)
 
 
 def _striped(metric: MapMetric, map_layout: MapLayout) -> list[tuple[np.ndarray, str]]:

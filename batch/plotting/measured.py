@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from batch.plotting.against import OtherGroup, not_in_other, other_unit
-from batch.plotting.layout import drawable
+from batch.plotting.layout import drawable, with_unit
 from batch.queries import requirements
 from batch.queries.pool import CaseColumn, Pool
 from batch.queries.signals import deck_unit
@@ -31,8 +31,8 @@ class MapMetric:
 
     @property
     def label(self) -> str:
-        """The label of the axis: `settle  (s)`."""
-        return f"{self.column.label}  ({self.column.unit})" if self.column.unit else self.column.label
+        """The label of the axis, with its unit."""
+        return with_unit(self.column.label, self.column.unit)
 
     @property
     def worse(self) -> str:
@@ -63,19 +63,13 @@ def map_metrics(pool: Pool, names: Sequence[str], others: Mapping[int, OtherGrou
     """The metrics of these names, all for none. others: by number of a group that of another archive. Raises Problem
     E393 for a metric that it has in another unit, or which is named and not there."""
     failed, both = pool.status != DONE, _both(pool, others)
+    columns = {column.key.partition(":")[2]: column for column in pool.metrics()}
     out = []
-    for column in pool.metrics():
-        name = column.key.partition(":")[2]
-        if not names or name in names:
-            theirs, theirs_missed = _theirs(pool, name, others, bool(names))
-            out.append(
-                MapMetric(column, drawable(column.values), pool.missed(column), failed, theirs, theirs_missed, both)
-            )
-    return sorted(out, key=lambda metric: _place(names, metric.column.key.partition(":")[2]))
-
-
-def _place(names: Sequence[str], name: str) -> int:
-    return list(names).index(name) if name in names else 0
+    for name in names or columns:
+        column = columns[name]
+        theirs = _theirs(pool, name, others, bool(names))
+        out.append(MapMetric(column, drawable(column.values), pool.missed(column), failed, *theirs, both))
+    return out
 
 
 def _both(pool: Pool, others: Mapping[int, OtherGroup]) -> np.ndarray | bool:
@@ -112,10 +106,6 @@ def _theirs(
         places = other.places[pool.position_of[places_here]]
         places_here, places = places_here[places >= 0], places[places >= 0]
         out[places_here] = drawable(other.group.values(name)[places] / deck_unit(mine)[0])
-        columns = [
-            group_requirement.place
-            for group_requirement in requirements.group_requirements(other.group)
-            if group_requirement.metric == name
-        ]
+        columns = [asked.place for asked in requirements.group_requirements(other.group) if asked.metric == name]
         missed[places_here] = (requirements.outcomes(other.group)[places][:, columns] == 0).any(axis=1)
     return (out, missed) if any_group else (None, None)

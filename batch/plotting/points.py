@@ -47,8 +47,8 @@ class Set:
 def scatter(ax: Any, metric: MapMetric, x: CaseColumn, by: CaseColumn | None, sheet: PictureSheet) -> Any:
     """Draw one metric over x, by the levels of another column. Returns the mappable for a colour bar, if one is
     needed."""
-    finite = np.isfinite(metric.values)
-    drawn = _apart(x.values, np.where(finite, metric.values, np.nan))
+    y = np.where(np.isfinite(metric.values), metric.values, np.nan)
+    drawn = _apart(x.values, y)
     size = MARKER / marker_scale(len(x.values)) ** 2
     style: dict[str, Any] = {"s": size, "linewidths": 0, "rasterized": len(drawn) > RASTERED}
     mapped = None
@@ -62,8 +62,7 @@ def scatter(ax: Any, metric: MapMetric, x: CaseColumn, by: CaseColumn | None, sh
         own = drawn[np.isin(drawn, point_set.places)] if len(sets) > 1 else drawn
         if point_set.joined:
             order = point_set.places[np.argsort(x.values[point_set.places])]
-            y = np.where(np.isfinite(metric.values[order]), metric.values[order], np.nan)
-            ax.plot(x.values[order], y, color=point_set.colour, linewidth=1.0)
+            ax.plot(x.values[order], y[order], color=point_set.colour, linewidth=1.0)
         ax.scatter(
             x.values[own],
             metric.values[own],
@@ -247,7 +246,7 @@ def bar(figure: Any, mapped: Any, axes: list[Any], by: CaseColumn, sheet: Pictur
         side = line(by)
         height = BAR * figure.get_figheight()
         write_log(drawn.ax.yaxis, replace(side, edges=levels(by.values)[[0, -1]]), height, sheet, upright=True)
-    drawn.set_label(f"{by.label}  ({by.unit})" if by.unit else by.label, fontsize=sheet.small)
+    drawn.set_label(layout.with_unit(by.label, by.unit), fontsize=sheet.small)
     drawn.outline.set_visible(False)
 
 

@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 
 from batch.archive.read import ArchiveFile, ArchiveGroup
-from batch.archive.stored import Stored
 from batch.plotting import layout, maps, points
 from batch.plotting.against import OtherGroup, file_names
 from batch.plotting.layout import PictureSheet
@@ -41,15 +40,16 @@ def plot_request(
     group: ArchiveGroup, pool: Pool, names: Sequence[str], cases: Sequence[str], over: Sequence[str]
 ) -> PlotRequest:
     """The requested signals or metrics, from the names and the other options. Raises Problem E323, E324, E391."""
-    metrics = {name: v for v in pool_metrics(pool) for name in (v.path, v.name)}
+    metrics = {name: v for v in pool.variables("metric") for name in (v.path, v.name)}
     signals, others = [], []
     for name in names:
-        if _is_signal(group, name):
+        try:
+            panels(group, [name])  # refuses what is no signal
             signals.append(name)
-        elif name in metrics:
+        except Problem as no_signal:
+            if name not in metrics:
+                raise _unknown(group, name, list(metrics), no_signal) from None
             others.append(metrics[name].name)
-        else:
-            raise _unknown(group, name, list(metrics))
     if signals and others:
         message = f"`{signals[0]}` is a signal and `{others[0]}` a metric: they have no axis in common"
         raise Problem(error("E391", message, help="draw two pictures, each with a name of its own: `-o FILE.png`"))
@@ -66,39 +66,18 @@ def plot_request(
     return PlotRequest(signals=tuple(signals), histories=bool(signals or cases or whole))
 
 
-def pool_metrics(pool: Pool) -> list[Stored]:
-    """The metrics of all groups, by name."""
-    return list({v.name: v for group in reversed(pool.groups) for v in group.role("metric")}.values())
-
-
-def _is_signal(group: ArchiveGroup, name: str) -> bool:
-    try:
-        panels(group, [name])
-    except Problem:
-        return False
-    return True
-
-
-def _unknown(group: ArchiveGroup, name: str, metrics: Sequence[str]) -> Problem:
-    """The problem that a name is neither a metric nor a signal; for signals, that of `panels`."""
+def _unknown(group: ArchiveGroup, name: str, metrics: Sequence[str], no_signal: Problem) -> Problem:
+    """The problem that a name is neither a metric nor a signal. no_signal: why it is no signal, which is said where the
+    run has signals alone, or neither."""
     signals = [v.name for v in group.role("signal")]
     metrics_text = f"metrics here: {', '.join(dict.fromkeys(metrics))}"
     if signals and metrics:
         helps = [*did_you_mean(name, [*signals, *metrics]), f"signals here: {', '.join(signals)}", metrics_text]
         return Problem(error("E324", f"no signal or metric `{name}` in `{group.name}`", help=helps))
-    try:
-        panels(group, [name])
-    except Problem as problem:
-        [diagnostic] = problem.diagnostics
-        meant = did_you_mean(name, metrics) if not signals else ()
-        return Problem(
-            error(
-                diagnostic.code,
-                diagnostic.message,
-                help=[*meant, *diagnostic.help, *([metrics_text] if metrics else [])],
-            )
-        )
-    raise AssertionError(name)
+    [diagnostic] = no_signal.diagnostics
+    meant = did_you_mean(name, metrics) if not signals else ()
+    helps = [*meant, *diagnostic.help, *([metrics_text] if metrics else [])]
+    return Problem(error(diagnostic.code, diagnostic.message, help=helps))
 
 
 # Parameters of the axes
@@ -148,12 +127,8 @@ def _not_varied(archive: ArchiveFile, pool: Pool, name: str, known: Sequence[str
             )
     if pool.count == 1:
         return Problem(error("E390", f"`{pool.name}` is one case: nothing is varied in it", help=()))
-    message = (
-        f"`{name}` is not varied in `{pool.name}`"
-        if _is_parameter(archive, pool, name)
-        else (f"no parameter `{name}` is varied in `{pool.name}`")
-    )
-    return Problem(error("E390", message, help=helps))
+    which = f"`{name}` is not" if _is_parameter(archive, pool, name) else f"no parameter `{name}` is"
+    return Problem(error("E390", f"{which} varied in `{pool.name}`", help=helps))
 
 
 def _is_parameter(archive: ArchiveFile, pool: Pool, name: str) -> bool:
@@ -229,7 +204,7 @@ def draw(
             metrics = [metric for metric in metrics if metric.theirs is not None]
         third = axes_columns[2] if len(axes_columns) > 2 else None
         planned = maps.plan(axes_columns[0], axes_columns[1], third, files)
-        figure, _ = maps.draw(sheet, planned, metrics, third)
+        figure = maps.draw(sheet, planned, metrics, third)
         below = f"{count}: {maps.description(planned, metrics, third)}"
     below = f"{below}; {left}" if left else below
     layout.title(figure, archive, pool.groups[0].name if len(pool.groups) == 1 else pool.name, below, sheet)
@@ -254,7 +229,7 @@ def _points(
         layout.head(ax, text, sheet, 1)
         ax.set_ylabel(layout.two_lines(metric.label))
         points.varied_axis(ax, x, sheet)
-    axes[-1][0].set_xlabel(f"{x.label}  ({x.unit})" if x.unit else x.label)
+    axes[-1][0].set_xlabel(layout.with_unit(x.label, x.unit))
     if mapped is not None and by is not None:
         points.bar(figure, mapped, [ax for [ax] in axes], by, sheet)
     layout.legend(figure, points.legend_of(layout.legend_entries(axes), files), sheet)

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from batch.plotting.layout import LETTER, PictureSheet
+from batch.plotting.layout import LETTER, PictureSheet, with_unit
 from batch.queries import grids
 from batch.queries.grids import ROUND, Levels, Scale, column_levels, edges_of, levels, round_numbers
 from batch.queries.pool import CaseColumn
@@ -41,7 +41,8 @@ class MapSide:
 
     @property
     def label(self) -> str:
-        return f"{self.column.label}  ({self.column.unit})" if self.column.unit else self.column.label
+        """The label of the axis, with its unit."""
+        return with_unit(self.column.label, self.column.unit)
 
     @property
     def centres(self) -> np.ndarray:
