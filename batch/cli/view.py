@@ -67,16 +67,14 @@ def view(
         if port is not None:
             raise click.UsageError(f"--port is for decks: the page of the archive `{source}` is a file")
         return _write(source, name, output, against, numbers, include_dirs, quiet, meshes=not no_meshes)
-    if output is not None:
-        raise click.UsageError(
-            f"-o is for archives: the page of the deck `{source}` is served; `met run` makes an archive of it"
-        )
-    if against is not None:
-        raise click.UsageError(f"--against is for archives: `met run {source}` makes one of the deck")
-    if numbers is not None:
-        raise click.UsageError(f"--numbers is for archives: `met run {source}` makes one of the deck")
-    if no_meshes:
-        raise click.UsageError("--no-meshes is for archives: the page of a deck has a switch for meshes")
+    for option, given, why in (
+        ("-o", output is not None, f"the page of the deck `{source}` is served; `met run` makes an archive of it"),
+        ("--against", against is not None, f"`met run {source}` makes one of the deck"),
+        ("--numbers", numbers is not None, f"`met run {source}` makes one of the deck"),
+        ("--no-meshes", no_meshes, "the page of a deck has a switch for meshes"),
+    ):
+        if given:
+            raise click.UsageError(f"{option} is for archives: {why}")
     return _watch(source, name, port or 0, defines, include_dirs, settings, quiet=quiet, verbose=verbose)
 
 

@@ -291,17 +291,13 @@ def _tightest(loops: dict[int, OpenLoop]) -> Iterator[str]:
         if loop.returns and loop.stable and loop.gains[1] is not None
     }
     margins = {case: loop.margins for case, loop in loops.items() if loop.margins is not None and loop.returns}
-    phases = {case: loop_margins.phase for case, loop_margins in margins.items() if loop_margins.phase is not None}
+    phases = {case: math.degrees(own.phase) for case, own in margins.items() if own.phase is not None}
+    disks = {case: own.disk for case, own in margins.items()}
     tightest = []
-    if gains:
-        case = min(gains, key=lambda case_number: gains[case_number] or math.inf)
-        tightest.append(f"gain {gains[case]:.4g} times in #{case}")
-    if phases:
-        case = min(phases, key=lambda case_number: phases[case_number] or math.inf)
-        tightest.append(f"phase {math.degrees(phases[case] or 0.0):.4g} deg in #{case}")
-    if margins:
-        case = min(margins, key=lambda case_number: margins[case_number].disk)
-        tightest.append(f"disk {margins[case].disk:.4g} in #{case}")
+    for text, by_case in (("gain {:.4g} times", gains), ("phase {:.4g} deg", phases), ("disk {:.4g}", disks)):
+        if by_case:
+            smallest, case = min((value, case) for case, value in by_case.items())
+            tightest.append(f"{text.format(smallest)} in #{case}")
     if tightest and len(loops) > 1:
         yield f"  tightest: {', '.join(tightest)}"
 

@@ -33,20 +33,19 @@ class Bar:
 
     def __post_init__(self) -> None:
         self._live = self.stream.isatty()
-        self._now = self.clock
         self._name, self._cases, self._first, self._workers = "", 0, 0, ""
         self._began, self._next, self._drawn = 0.0, 0.0, False
 
     def begin(self, name: str, cases: int, done: int = 0, failed: int = 0, workers: str = "") -> None:
         """Begin a new experiment, some of whose cases may be done already. cases: 0 where their number is not known"""
         self._name, self._cases, self._first, self._workers = line(name), cases, done, line(workers)
-        self._began = self._now()
+        self._began = self.clock()
         self._next = self._began + (FIRST_SECONDS if self._live else LINE_SECONDS)
         self._drawn = False
 
     def advance(self, done: float, failed: int = 0, more: str = "") -> None:
         """Update the number of its cases that are done, parts of one counted, and of failed ones. more: further text"""
-        now = self._now()
+        now = self.clock()
         if now < self._next or 0 < self._cases <= done:
             return
         elapsed = now - self._began

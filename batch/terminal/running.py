@@ -7,6 +7,7 @@ import os
 import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import Any
 
 from batch.archive.read import ArchiveFile
 from batch.campaigns.campaign import Campaign, prepare
@@ -36,24 +37,10 @@ from batch.terminal.verdict import (
     writing,
 )
 from met.diagnostic import Problem, error
-from met.frozen import frozen
 from met.host.sources import names_archive, names_plan
 from met.host.streams import OutputLost, kept
 from met.messages import visible
 from met.outputs import quoted
-
-
-@frozen
-class RunRequest:
-    """Runs of a deck, a plan or an archive, with the options for reading a deck, as for
-    `batch.campaigns.choosing.read_plan`."""
-
-    source: str
-    names: tuple[str, ...]
-    everything: bool
-    defines: tuple[str, ...]
-    include_dirs: tuple[str, ...]
-    settings: tuple[str, ...]
 
 
 def run_and_tell(
@@ -87,16 +74,16 @@ def run_and_tell(
     if failed and not names_archive(source):
         helps = "`met run ARCHIVE.h5 --failed` runs those again that failed"
         raise Problem(error("E357", f"`--failed` is of an archive, and {source} is none", help=helps))
-    request = RunRequest(source, names, everything, defines, include_dirs, settings)
+    how_read = {"everything": everything, "defines": defines, "include_dirs": include_dirs, "settings": settings}
     executor = choose(threads=threads, processes=processes, dask=dask, timeout=timeout)
     if not isinstance(executor, Threads):
-        rehearse(timeout, **dataclasses.asdict(request))
+        rehearse(timeout, source=source, names=names, **how_read)
     archive, target = archive_and_export(output)
     again = replay(source, names, cases, failed, everything) if names_archive(source) else None
     if again is not None:
         campaign = _of_archive(source, again, archive, histories, float32, verify, rows)
     else:
-        campaign = _of_deck(request, archive, cases, histories, float32, quiet or json, verify, rows)
+        campaign = _of_deck(source, names, how_read, archive, cases, histories, float32, quiet or json, verify, rows)
     if target is not None:
         check(campaign, target, histories=bool(histories))
     say("\n".join(announcement(campaign, verbose, notes=verbose or names_plan(source))))
@@ -164,7 +151,7 @@ def _performed(
 ) -> Performed | None:
     """Run a campaign's cases; None where it stopped, with a message, because more cases failed than may."""
     try:
-        performed = perform(
+        return perform(
             campaign,
             executor=executor,
             fresh=fresh,
@@ -182,7 +169,6 @@ def _performed(
         if str(interrupt) and not json:
             visible.say(f"\n{interrupt}", err=True)
         raise
-    return performed
 
 
 def _result(campaign: Campaign, performed: Performed, no_picture: bool, say: Callable[[str], None]) -> RunResult:
@@ -296,8 +282,8 @@ def submit_and_tell(
     from batch.executors.submitting import submit
 
     say = (lambda *_: None) if quiet or json else visible.say
-    request = RunRequest(source, names, everything, defines, include_dirs, settings)
-    campaign = _of_deck(request, output, cases, histories, float32, quiet or json, verify, rows)
+    how_read = {"everything": everything, "defines": defines, "include_dirs": include_dirs, "settings": settings}
+    campaign = _of_deck(source, names, how_read, output, cases, histories, float32, quiet or json, verify, rows)
     say("\n".join(announcement(campaign, verbose, notes=verbose or names_plan(source))))
     done = submit(campaign, jobs=jobs, options=options, timeout=timeout, fresh=fresh, say=say)
     archive = str(campaign.output)
@@ -317,7 +303,9 @@ def submit_and_tell(
 
 
 def _of_deck(
-    request: RunRequest,
+    source: str,
+    names: tuple[str, ...],
+    how_read: dict[str, Any],
     output: str | Path | None,
     cases: tuple[str, ...],
     histories: str | Sequence[str],
@@ -326,11 +314,12 @@ def _of_deck(
     verify: Verify,
     rows: str,
 ) -> Campaign:
-    """The requested campaign of a deck or a plan."""
+    """The campaign of a deck's or a plan's runs and sweeps of these names. how_read: further arguments of `read_plan`,
+    such as macros and settings"""
     return prepare(
-        read_plan(**dataclasses.asdict(request), quiet=quiet),
+        read_plan(source, names, **how_read, quiet=quiet),
         output=output,
-        experiments=request.names or None,
+        experiments=names or None,
         cases=cases or None,
         histories=histories or "default",
         float32=float32,

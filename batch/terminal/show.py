@@ -332,7 +332,8 @@ def _metric_table(summary: Summary) -> Iterator[str]:
         if errors is not None:
             error = error_text(errors.metrics.get(metric.name), metric.deck_scale)
             numbers.append(error if not single else "" if error == NONE else f"± {error}")
-        rows.append((metric.name, *numbers, unit, _metric_words(metric, single)))
+        infinite = f"; infinite in {metric.infinite:,}" if metric.infinite and not single else ""
+        rows.append((metric.name, *numbers, unit, f"{metric.about}{infinite}"))
     widths = [max(len(row[column]) for row in rows) for column in range(len(rows[0]))]
     for row in rows[1:] if single else rows:
         cells = (" " if single else "  ").join(
@@ -343,7 +344,7 @@ def _metric_table(summary: Summary) -> Iterator[str]:
 
 
 def _metric_numbers(metric: MetricSummary, single: bool, columns: Sequence[SpreadColumn]) -> tuple[str, ...]:
-    """The numbers of a metric's finite values, as texts; `_metric_words` counts the others."""
+    """The numbers of a metric's finite values, as texts."""
     if single:
         return ("inf" if metric.infinite else _text(metric.median, metric),)
     return tuple(_text(getattr(metric, column.field), metric) for column in columns)
@@ -351,13 +352,6 @@ def _metric_numbers(metric: MetricSummary, single: bool, columns: Sequence[Sprea
 
 def _text(value: float, metric: MetricSummary) -> str:
     return "-" if math.isnan(value) else number_text(value / metric.deck_scale)
-
-
-def _metric_words(metric: MetricSummary, single: bool) -> str:
-    words = metric.about
-    if metric.infinite and not single:
-        words += f"; infinite in {metric.infinite:,}"
-    return words
 
 
 def signal_lines(archive: ArchiveFile, group: ArchiveGroup, signals: Sequence[str], case: int | None) -> list[str]:
