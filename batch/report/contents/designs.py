@@ -8,7 +8,7 @@ from batch.archive.read import ArchiveFile, ArchiveGroup
 from batch.campaigns.judging import judged_best
 from batch.queries.best import DesignAxis, Designs
 from batch.queries.best_answer import BestAnswer, context
-from batch.queries.pool import CaseColumn, Pool
+from batch.queries.pool import Pool
 from batch.queries.search_answers import SearchAnswer
 from batch.queries.search_result import search_result
 from batch.queries.signals import deck_unit, number_text
@@ -73,23 +73,15 @@ def design_map(designs: Designs, best: int) -> DesignMap | None:
     cells = np.full((len(y.values), len(x.values)), -1)
     cells[y.level[in_plane], x.level[in_plane]] = steps[in_plane]
     best_cell = int(y.level[best]), int(x.level[best])
-    return DesignMap(_name(x), _name(y), _unit(x), _unit(y), _texts(x), _texts(y), cells, best_cell)
+    return DesignMap(_name(x), _name(y), x.columns[0].unit, y.columns[0].unit, _texts(x), _texts(y), cells, best_cell)
 
 
 def _sentence(text: str) -> str:
     return text[:1].upper() + text[1:]
 
 
-def _first(axis: DesignAxis) -> CaseColumn:
-    return axis.columns[0]
-
-
 def _name(axis: DesignAxis) -> str:
     return " with ".join(column.label for column in axis.columns)
-
-
-def _unit(axis: DesignAxis) -> str:
-    return _first(axis).unit
 
 
 def _texts(axis: DesignAxis) -> tuple[str, ...]:
@@ -121,7 +113,7 @@ def search_answer(archive: ArchiveFile, group: ArchiveGroup) -> DesignAnswer | N
     scale, _ = deck_unit(next(metric for metric in group.role("metric") if metric.path == search.metric))
     headline, *why = unwrapped(answer.lines())
     return DesignAnswer(
-        headline=headline[:1].upper() + headline[1:],
+        headline=_sentence(headline),
         why="\n".join(why),
         table=TextTable(heads, ("",) * len(heads), tuple(rows[n] for n in row_numbers), frozenset({0, 1, 2, 4})),
         stretches=None,

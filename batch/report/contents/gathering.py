@@ -284,11 +284,10 @@ def _sources(archive: ArchiveFile) -> Iterator[SourceListing]:
 def _provenance(archive: ArchiveFile, groups: Sequence[ArchiveGroup]) -> Iterator[Fact]:
     """Where the archive comes from: its file, deck, commit, versions and keys, a fact each."""
     provenance = archive.provenance
-    size = archive.path.stat().st_size
     changed = {"yes": ", with changes that were not committed", "unknown": ""}.get(str(provenance.get("git_dirty")), "")
     yield from [
-        Fact("archive", f"{archive.path.name} ({size_text(size)})"),
-        Fact("SHA-256 of it", _digest(archive.path) if size <= MOST_HASHED else "not computed: it is large", True),
+        Fact("archive", f"{archive.path.name} ({size_text(archive.path.stat().st_size)})"),
+        Fact("SHA-256 of it", _digest(archive.path), True),
         Fact("deck", archive.deck),
         Fact("commit of MET", f"{provenance.get('git_commit', 'unknown')}{changed}", True),
     ]
@@ -303,12 +302,15 @@ def _provenance(archive: ArchiveFile, groups: Sequence[ArchiveGroup]) -> Iterato
 
 
 def _compared_with(against: ComparedArchive) -> tuple[Fact, ...]:
+    """Facts about the file that an archive is compared with: its name, size and SHA-256."""
     path, name = against.file.path, str(against.differences.a)
-    size = path.stat().st_size
-    digest = _digest(path) if size <= MOST_HASHED else "not computed: it is large"
-    return Fact("compared with", f"{name} ({size_text(size)})"), Fact(f"SHA-256 of {name}", digest, True)
+    size = size_text(path.stat().st_size)
+    return Fact("compared with", f"{name} ({size})"), Fact(f"SHA-256 of {name}", _digest(path), True)
 
 
 def _digest(path: Path) -> str:
+    """The SHA-256 of an archive's file; words where it is too large for that."""
+    if path.stat().st_size > MOST_HASHED:
+        return "not computed: it is large"
     with open_regular(path) as file:
         return hashlib.file_digest(file, "sha256").hexdigest()

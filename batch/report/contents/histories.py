@@ -61,8 +61,9 @@ class EarlierHistories:
             if mine is not None and len(rows):
                 now = _lines(panel, mine, history(group, mine, position))
                 changes[n] = thin(now[rows] - was[was_rows], self.points)
-        change = History(case, self._clock(time[rows]), changes) if changes else None
-        return (History(case, self._clock(was_time), was_values), change) if was_values else (None, None)
+        clocks, points = self.clocks, self.points
+        change = History(case, _clock(clocks, time[rows], points), changes) if changes else None
+        return (History(case, _clock(clocks, was_time, points), was_values), change) if was_values else (None, None)
 
     def _panels_of(self, other: bool, group: ArchiveGroup) -> dict[tuple[str, str], Panel]:
         """The panels of a group of either archive, by name and unit, in the page's units."""
@@ -76,13 +77,16 @@ class EarlierHistories:
         scaled = self.scaled.get((panel.name, panel.si))
         return panel if scaled is None else replace(panel, unit=scaled.unit, scale=scaled.scale, in_si=scaled.in_si)
 
-    def _clock(self, time: np.ndarray) -> int:
-        """The number of a time axis, thinned, among those of the page."""
-        thinned = thin_clock(time, self.points)
-        same = [n for n, clock in enumerate(self.clocks) if np.array_equal(clock, thinned)]
-        if not same:
-            self.clocks.append(thinned)
-        return same[0] if same else len(self.clocks) - 1
+
+def _clock(clocks: list[np.ndarray], time: np.ndarray, points: int) -> int:
+    """The number of a time axis, s, thinned to so many points, among those of the page, to which it is added unless the
+    same one is there."""
+    thinned = thin_clock(time, points)
+    for number, clock in enumerate(clocks):
+        if np.array_equal(clock, thinned):
+            return number
+    clocks.append(thinned)
+    return len(clocks) - 1
 
 
 def _lines(page: SignalPanel, panel: Panel, values: np.ndarray) -> np.ndarray:
@@ -151,10 +155,7 @@ def signals(
     names: dict[tuple[str, str], SignalPanel] = {}
     for number, structure in enumerate(groups):
         if structure.panels:
-            time = thin_clock(structure.group.values("time"), points)
-            same = [n for n, other in enumerate(clocks) if np.array_equal(other, time)]
-            clock_of[number] = same[0] if same else len(clocks)
-            clocks += [] if same else [time]
+            clock_of[number] = _clock(clocks, structure.group.values("time"), points)
         for panel in structure.panels:
             key = panel.name, panel.unit
             names[key] = _joined(names.get(key), structure.described(panel))

@@ -16,7 +16,7 @@ from batch.queries.pool import ENDED, CaseColumn
 from batch.queries.signals import pretty_unit
 from batch.report.contents.changes import ArchiveChanges
 from batch.report.contents.parts import History, Map, Overview, ReportSection, Ruler, Signals, Stability
-from batch.report.contents.simulated import PageSimulation, SimulatedStructure
+from batch.report.contents.simulated import SimulatedStructure
 from batch.report.html.markup import Html
 from met.messages.visible import visible
 
@@ -42,7 +42,9 @@ def section_data(section: ReportSection, replay: str, changes: ArchiveChanges | 
         "ended": list(ENDED),
         "overview": None if section.overview is None else overview_data(section.overview),
         "signals": None if section.signals is None else _signals(section.signals),
-        "simulation": None if section.simulation is None else _simulation(section.simulation),
+        "simulation": None
+        if section.simulation is None
+        else {"structures": [_structure(structure) for structure in section.simulation.structures]},
         "stability": None if section.stability is None else _stability(section.stability),
     }
 
@@ -223,10 +225,6 @@ def _history(history: History | None) -> dict[str, Any]:
         return {}
     lines = {str(place): [packed(line) for line in values.T] for place, values in history.values.items()}
     return {"clock": history.clock, "panels": lines}
-
-
-def _simulation(page_simulation: PageSimulation) -> dict[str, Any]:
-    return {"structures": [_structure(structure) for structure in page_simulation.structures]}
 
 
 def _structure(structure: SimulatedStructure) -> dict[str, Any]:

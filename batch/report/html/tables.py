@@ -22,27 +22,18 @@ SHOWN_CASES = 8
 """Number of visible rows of the best and of the worst cases; the others are folded away."""
 
 
-def table(text_table: TextTable, label: str, cells: Sequence[Sequence[Child]] = (), more: Sequence[str] = ()) -> Html:
-    """A table of texts. cells, more: further cells of each row, and their heads."""
-    heads = [*_headings(text_table), *headings(more)]
-    rows = []
-    for number, row in enumerate(text_table.rows):
-        own = [
-            el(
-                "td",
-                text,
-                cls=" ".join(
-                    filter(
-                        None,
-                        ["right" if n in text_table.right else "", "bad" if (number, n) in text_table.marked else ""],
-                    )
-                )
-                or None,
-            )
-            for n, text in enumerate(row)
-        ]
-        rows.append(el("tr", own, [el("td", cell) for cell in (cells[number] if cells else ())]))
-    return rows_under(heads, rows, label)
+def table(text_table: TextTable, label: str) -> Html:
+    """A table of texts."""
+    rows = [
+        el("tr", [el("td", text, cls=" ".join(_classes(text_table, number, n)) or None) for n, text in enumerate(row)])
+        for number, row in enumerate(text_table.rows)
+    ]
+    return rows_under(_headings(text_table), rows, label)
+
+
+def _classes(text_table: TextTable, row: int, column: int) -> list[str]:
+    """The classes of a cell of a table: flush right, and marked as bad."""
+    return ["right"] * (column in text_table.right) + ["bad"] * ((row, column) in text_table.marked)
 
 
 def _headings(text_table: TextTable) -> list[Html]:
@@ -59,11 +50,8 @@ def cases(notable: NotableCases) -> Html:
     for number, row in enumerate(columns.rows):
         own: list[Html] = [el("th", case_link(notable.cases[number]), scope="row", cls="right")]
         for n, text in list(enumerate(row))[1:]:
-            classes = ["right"] if n in columns.right else []
-            classes += ["bad"] if (number, n) in columns.marked else []
-            last = n == len(row) - 1
-            classes += ["bad"] if last and text not in ("met", "done") else []
-            classes += ["id"] if n == 1 else []
+            classes = _classes(columns, number, n)
+            classes += ["bad"] * (n == len(row) - 1 and text not in ("met", "done")) + ["id"] * (n == 1)
             own.append(el("td", el("code", text) if n == 1 else text, cls=" ".join(classes) or None))
         own.append(el("td", command(notable.commands[number]), cls="command"))
         rows.append(el("tr", own, data_case=notable.cases[number]))
