@@ -28,8 +28,6 @@ class LinearAnswer:
 
     def write(self, output: Path | str) -> None:
         """Writes A, B, C, D with names into a new file: .npz, .h5 or .csv. Raises Problem E305, E326."""
-        from batch.linearized import data
-
         data.check(path_of(output))
         data.write(self.found, Path(output))
 

@@ -60,13 +60,7 @@ def to_xarray(linearized: Linearized) -> Any:
     shares = [[dict(pole.shares)[state] for state in linearized.states] for pole in poles]
     data["share"] = (("mode", "state"), np.array(shares).reshape(len(poles), len(linearized.states)))
     coordinates = {name: list(values) for name, values in axes(linearized).items()}
-    about = {
-        "experiment": linearized.experiment,
-        "case": linearized.case,
-        "time": linearized.time,
-        "period": linearized.seconds,
-    }
-    return xarray.Dataset(data, coordinates, about)
+    return xarray.Dataset(data, coordinates, _about(linearized))
 
 
 def state_space(linearized: Linearized) -> Any:

@@ -27,7 +27,7 @@ def influences(pool: Pool) -> tuple[InfluencePart, ...]:
         return ()
     names = _metrics(group)
     if group.count < FEWEST:
-        return (InfluencePart("", f"Not enough cases to tell: {group.count:,}; {FEWEST} at least.", "", 0.0, (), ()),)
+        return (InfluencePart("", f"Not enough cases to tell: {group.count:,}; {FEWEST} at least.", 0.0, (), ()),)
     try:
         return tuple(map(_part, sensitivities(group, names[:MOST_METRICS]))) if names else ()
     except Problem:  # nothing varies
@@ -47,9 +47,9 @@ def _part(sensitivity: Sensitivity) -> InfluencePart:
     )
     if sensitivity.cases < sensitivity.fewest:
         why_none = f"not enough cases, {count}; {sensitivity.fewest:,} at least"
-        return InfluencePart(sensitivity.name, why_none, sensitivity.unit, 0.0, (), ())
+        return InfluencePart(sensitivity.name, why_none, 0.0, (), ())
     if not sensitivity.shares:
-        return InfluencePart(sensitivity.name, f"the same in all cases, {count}", sensitivity.unit, 0.0, (), ())
+        return InfluencePart(sensitivity.name, f"the same in all cases, {count}", 0.0, (), ())
     rows = []
     for place in sensitivity.order[:MOST_INPUTS]:
         share = sensitivity.shares[place]
@@ -68,6 +68,4 @@ def _part(sensitivity: Sensitivity) -> InfluencePart:
     notes = list(notes_of(sensitivity))
     if len(sensitivity.order) > len(rows):
         notes.append(f"{len(sensitivity.order) - len(rows):,} parameters more explain less")
-    return InfluencePart(
-        sensitivity.name, count, sensitivity.unit, sensitivity.mean / sensitivity.scale, tuple(rows), tuple(notes)
-    )
+    return InfluencePart(sensitivity.name, count, sensitivity.mean / sensitivity.scale, tuple(rows), tuple(notes))

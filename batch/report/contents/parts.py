@@ -256,12 +256,11 @@ class InfluenceRow:
 class InfluencePart:
     """The parameters that explain a metric, those that explain most first; none where nothing can be told, as is said.
 
-    metric  "" where it is said of all;  mean: of the metric, in `unit`
+    metric  "" where it is said of all;  mean: of the metric, in the deck's unit
     """
 
     metric: str
     summary: str
-    unit: str
     mean: float
     rows: tuple[InfluenceRow, ...]
     notes: tuple[str, ...]
