@@ -19,10 +19,10 @@ from batch.report.contents import histories, overview, stability
 from batch.report.contents.against import ComparedArchive
 from batch.report.contents.designs import design_map
 from batch.report.contents.gathering import gather
+from batch.report.contents.histories import thin, thin_clock
 from batch.report.contents.overview import _steps as round_steps
 from batch.report.contents.overview import ruler
 from batch.report.contents.parts import OutcomeCount, Report
-from batch.report.contents.thinning import thin, thin_clock
 from batch.report.html.payload import _column
 from met.analysis.margin import margins
 from tests.batch import plans
