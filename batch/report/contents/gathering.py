@@ -17,13 +17,12 @@ from batch.report.contents import comparison
 from batch.report.contents.against import ComparedArchive, EarlierCases, of_groups
 from batch.report.contents.designs import design_answer
 from batch.report.contents.histories import MOST_VALUES, WHERE_RUN_AGAIN, no_signals, signals
-from batch.report.contents.influence import influences
 from batch.report.contents.overview import overview
 from batch.report.contents.parameters import parameters, varied
 from batch.report.contents.parts import Fact, Report, ReportSection, Signals, SourceListing, Stability
 from batch.report.contents.simulation import MOST_STRUCTURES, ComputedGroup, simulation
 from batch.report.contents.stability import stability
-from batch.report.contents.tables import best, evidence_part, replay, structures, worst
+from batch.report.contents.tables import best, evidence_part, influences, replay, structures, worst
 from batch.report.contents.verdicts import metric_rows, verdict
 from ic.printing.columns import size as size_text
 from met.diagnostic import Problem

@@ -1,4 +1,5 @@
-"""Tables of a report: the best and the worst cases, the structures of a sweep side by side, and the evidence."""
+"""Tables of a report: the best and the worst cases, the structures of a sweep side by side, the evidence, and the
+varied parameters that explain each metric, as `met sensitivity` finds them."""
 
 from __future__ import annotations
 
@@ -6,15 +7,28 @@ from dataclasses import replace
 
 import numpy as np
 
+from batch.archive.read import ArchiveGroup
 from batch.archive.searched import is_search
 from batch.queries.evidence_table import NONE, EvidenceTexts, notes_of, requirement_evidence, texts_of
 from batch.queries.pool import ENDED, CaseColumn, Pool, page_number
+from batch.queries.requirements import group_requirements
+from batch.queries.sensitivity import Sensitivity, sensitivities, share_text, total_text
+from batch.queries.sensitivity import notes_of as sensitivity_notes
 from batch.queries.summary import median_text
 from batch.report.contents.against import GOOD, EarlierCases
-from batch.report.contents.parts import EvidenceLine, EvidencePart, NotableCases, TextTable
+from batch.report.contents.parts import (
+    EvidenceLine,
+    EvidencePart,
+    InfluencePart,
+    InfluenceRow,
+    NotableCases,
+    TextTable,
+)
 from ic.printing.columns import count as counted
+from met.diagnostic import Problem
 from met.distinct import distinct
 from met.outputs import quoted
+from met.statistics.sensitivity import FEWEST
 
 MOST_CASES, MOST_BEST = 20, 5
 """Rows of the tables of worst and of best cases."""
@@ -170,3 +184,66 @@ def _with_dashes(texts: EvidenceTexts) -> EvidenceTexts:
     """The texts with the page's dash in place of missing ones."""
     names = EvidenceTexts.__dataclass_fields__
     return EvidenceTexts(**{n: "\N{EN DASH}" if (text := getattr(texts, n)) == NONE else text for n in names})
+
+
+# Which parameters matter
+
+
+MOST_METRICS, MOST_INPUTS, MOST_SAMPLED = 6, 12, 50_000
+"""Largest number of metrics, of parameters of each, and of cases that are used."""
+
+
+def influences(pool: Pool) -> tuple[InfluencePart, ...]:
+    """A part for each metric of a sweep of one structure with draws or enough cases, those with requirements first;
+    none where one parameter varies, or a search chose the cases, which are not a sample."""
+    if len(pool.groups) != 1 or is_search(pool.groups[0]):
+        return ()
+    [group] = pool.groups
+    coordinates = group.role("coordinate")
+    drawn = any(variable.attributes.get("design") for variable in coordinates)
+    if len(coordinates) < 2 or group.count > MOST_SAMPLED or not (drawn or group.count >= FEWEST):
+        return ()
+    names = _metrics(group)
+    if group.count < FEWEST:
+        return (InfluencePart("", f"Not enough cases to tell: {group.count:,}; {FEWEST} at least.", 0.0, (), ()),)
+    try:
+        return tuple(map(_influence, sensitivities(group, names[:MOST_METRICS]))) if names else ()
+    except Problem:  # nothing varies
+        return ()
+
+
+def _metrics(group: ArchiveGroup) -> list[str]:
+    """The group's metrics, those with requirements first."""
+    required = dict.fromkeys(group_requirement.metric for group_requirement in group_requirements(group))
+    return list(dict.fromkeys([*required, *(variable.name for variable in group.role("metric"))]))
+
+
+def _influence(sensitivity: Sensitivity) -> InfluencePart:
+    """The parameters that explain a metric, as texts of the page; without rows where there are too few cases."""
+    count = f"{sensitivity.cases:,} cases" + (
+        f"; {sensitivity.left:,} are left out, with no finite value" if sensitivity.left else ""
+    )
+    if sensitivity.cases < sensitivity.fewest:
+        why_none = f"not enough cases, {count}; {sensitivity.fewest:,} at least"
+        return InfluencePart(sensitivity.name, why_none, 0.0, (), ())
+    if not sensitivity.shares:
+        return InfluencePart(sensitivity.name, f"the same in all cases, {count}", 0.0, (), ())
+    rows = []
+    for place in sensitivity.order[:MOST_INPUTS]:
+        share = sensitivity.shares[place]
+        low, high = share.low / sensitivity.scale, share.high / sensitivity.scale
+        rows.append(
+            InfluenceRow(
+                path=sensitivity.inputs[place],
+                alone=share_text(share.first, share.first_by),
+                together=total_text(share),
+                low=low,
+                high=high,
+                ends=sensitivity.ends(share, f"{page_number(low)} …", page_number(high)),
+                rank=f"{share.rank:+.2f}",
+            )
+        )
+    notes = list(sensitivity_notes(sensitivity))
+    if len(sensitivity.order) > len(rows):
+        notes.append(f"{len(sensitivity.order) - len(rows):,} parameters more explain less")
+    return InfluencePart(sensitivity.name, count, sensitivity.mean / sensitivity.scale, tuple(rows), tuple(notes))

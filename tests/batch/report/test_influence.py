@@ -13,7 +13,7 @@ from batch.archive.read import ArchiveFile
 from batch.queries.pool import pools
 from batch.queries.sensitivity import sensitivities, share_text
 from batch.report import report
-from batch.report.contents.influence import influences
+from batch.report.contents.tables import influences
 
 DECK = """
 #include <two_link.ic>
