@@ -12,9 +12,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from batch.arms.meshes import NO_MESHES, ArmMeshes, arm_meshes, meshes_json
-from batch.arms.placing import INSTANT as EARLY
-from batch.arms.placing import OF_FREE_BASE, POSITION, parameters
-from batch.arms.scene import ArmScene, arm_scene, lacking, scene_json
+from batch.arms.scene import EARLY, OF_FREE_BASE, POSITION, ArmScene, arm_scene, lacking, parameters, scene_json
 from batch.arms.shapes import numbers
 from met.dynamics.kinematics import LinkMotion
 from met.dynamics.spatial import Pose, is_zero, rotation_quaternion, settled, turn_vector_back

@@ -1,4 +1,5 @@
-"""An arm as formulas: its bodies' frames and shapes, from a case's recorded signals and varied parameters.
+"""An arm as formulas: its bodies' frames and shapes, from a case's recorded signals and varied parameters; and the
+links' frames in the world, from the numbers of a case.
 
 The functions of the simulation are recorded once, over inputs instead of numbers, and stored as `met.trace.Formulas`; a
 page (`assets/formulas.js`) and `met plot --arm` replay them. So all pictures use the same kinematics, for each case
@@ -11,15 +12,24 @@ import math
 from collections.abc import Collection, Mapping, Sequence
 from typing import Any
 
-from batch.arms.placing import OF_FREE_BASE, POSITION, parameters, world_poses
+import numpy as np
+
 from batch.arms.shapes import ArmNumbers, drawn, numbers, shape_of, shapes
 from met.dynamics.spatial import HERE, IDENTITY, Pose, Vector, compose, rotation_quaternion, scale, settled
 from met.frozen import frozen
-from met.plan import BASE, Experiment, Link, Payload
+from met.plan import BASE, Experiment, Formula, Link, Payload
 from met.program.courses import TIME
-from met.program.motion.base import prescribed
+from met.program.motion.base import BaseMotion, motions, prescribed
 from met.program.system import PARAMETER, System
-from met.trace import Formulas, Graph
+from met.trace import Formulas, Graph, Scalar
+
+POSITION = "q"
+
+OF_FREE_BASE = (f"links.{BASE}.position", f"links.{BASE}.orientation")
+"""Signals that give the pose of a free base."""
+
+EARLY = 1e-6
+"""Share of a step by which a row's time may be rounded below its instant."""
 
 LIMB, LIMB_OF_LINK = 0.03, 0.32
 """Radius of a limb without a size of its own: at most this share of the arm's reach, and of its middle link's
@@ -250,3 +260,47 @@ def _up(experiment: Experiment, first: Mapping[str, float]) -> tuple[float, floa
                 x, y, z = (-math.copysign(1.0, g[most]) if axis == most else 0.0 for axis in range(3))
                 return (x, y, z)
     return (0.0, 0.0, 1.0)
+
+
+# Poses of the links in the world, from the numbers of a case: at all its rows at once, or traced
+
+
+def parameters(experiment: Experiment, varied: Mapping[str, Any]) -> dict[str, Any]:
+    """The numbers among a case's parameters, of which some follow from varied ones. varied: numbers, arrays of one
+    shape, or traced numbers; dependent parameters are of the same kind"""
+    outputs = experiment.formulas.replay({path: _plain(value) for path, value in varied.items()})
+    out = {}
+    for path, quantity in experiment.parameters.items():
+        value = outputs[quantity.value.output] if isinstance(quantity.value, Formula) else quantity.value
+        if isinstance(value, int | float | np.floating | np.ndarray | Scalar):
+            out[path] = _plain(value)
+    return out
+
+
+def _plain(value: Any) -> Any:
+    return value if isinstance(value, Scalar) or np.ndim(value) else float(value)
+
+
+def free_pose(position: np.ndarray, orientation: np.ndarray) -> Pose:
+    """A free base's pose from its recorded numbers: (..., 3) and (..., 4)."""
+    p, q = np.moveaxis(position, -1, 0), np.moveaxis(orientation, -1, 0)
+    return Pose(rotation_quaternion(q[0], q[1], q[2], q[3]), (p[0], p[1], p[2]))
+
+
+def prescribed_pose(experiment: Experiment, values: Mapping[str, Any], time: np.ndarray) -> Pose:
+    """A prescribed base's pose at rows of these times, s: that of the step's instant, like all recorded values."""
+    memory = {PARAMETER + path: value for path, value in values.items()}
+    step = experiment.structure.schedule.step
+    instant: Any = np.floor(time / step + EARLY) * step
+    return prescribed(System(experiment), memory.__getitem__, instant).pose
+
+
+def world_poses(
+    experiment: Experiment, values: Mapping[str, Any], q: Sequence[Any], base: Pose = HERE
+) -> dict[str, Pose]:
+    """Every link's frame in the world; where it changes, its numbers are arrays over all rows."""
+    system = System(experiment)
+    memory = {PARAMETER + path: value for path, value in values.items()}
+    system.keep_tree(memory.__getitem__, memory.__setitem__)
+    motion_of = motions(system.tree(memory.__getitem__), q, [0.0] * len(q), BaseMotion(base))
+    return {name: motion.pose for name, motion in motion_of.items()}

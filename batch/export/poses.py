@@ -13,7 +13,7 @@ import numpy as np
 from batch.archive.read import reading
 from batch.archive.stored import Stored
 from batch.arms.meshes import NO_MESHES, ArmMeshes
-from batch.arms.placing import OF_FREE_BASE, POSITION, free_pose, parameters, prescribed_pose, world_poses
+from batch.arms.scene import OF_FREE_BASE, POSITION, free_pose, parameters, prescribed_pose, world_poses
 from batch.export.picking import ExportedCase
 from met.diagnostic import Problem, error
 from met.dynamics.spatial import HERE, IDENTITY, Pose, compose, inverse, sub

@@ -10,7 +10,7 @@ import numpy as np
 import xarray
 
 from batch.archive.read import ArchiveGroup
-from batch.arms.placing import OF_FREE_BASE, POSITION, free_pose, parameters, prescribed_pose, world_poses
+from batch.arms.scene import OF_FREE_BASE, POSITION, free_pose, parameters, prescribed_pose, world_poses
 from batch.export.poses import lacking_help, pose_variables
 from batch.notebook.quantities import number
 from batch.notebook.table import CASE, NO_HISTORIES, RECORDED, experiment, path_of, places, run_name, unknown_name
