@@ -166,7 +166,8 @@ class ArmMeshes:
 
     @property
     def words(self) -> str:
-        """How much is drawn, and what is not; "" of an arm that names no mesh."""
+        """Words on the meshes that are drawn, with their triangles, and on those that are not; "" of an arm that names
+        none."""
         drawn, whole = sum(len(mesh.faces) for mesh in self.links), sum(mesh.whole for mesh in self.links)
         size = sum(mesh.points.size + mesh.faces.size for mesh in self.links) * PAGE_BYTES / 1000
         reduced = f"{drawn:,} triangles" + (f" of {whole:,}" if drawn < whole else "")
@@ -211,6 +212,7 @@ def meshes_json(meshes: ArmMeshes, bodies: Sequence[str]) -> list[dict[str, Any]
 
 
 def _json(mesh: LinkMesh, body: int) -> dict[str, Any]:
+    """A link's mesh as a page's script takes it. body: the link's number in the scene"""
     low = mesh.points.min(axis=0)
     edge = float((mesh.points.max(axis=0) - low).max()) / CELLS
     cells = np.rint((mesh.points - low) / edge)
@@ -218,6 +220,7 @@ def _json(mesh: LinkMesh, body: int) -> dict[str, Any]:
 
 
 def _text(numbers: np.ndarray) -> str:
+    """Whole numbers of 16 bits as base64, little-endian."""
     return base64.b64encode(np.ascontiguousarray(numbers, "<u2").tobytes()).decode("ascii")
 
 

@@ -48,6 +48,7 @@ def lsp(include_dirs: tuple[str, ...], defines: tuple[str, ...], stdio: bool) ->
 
 
 def _last_runs(deck: str) -> Mapping[str, LastRun]:
+    """The last run of each run and sweep of a deck, from the archives beside it."""
     from batch.queries.last_run import last_runs  # an archive's reader is loaded where a lens is asked for
 
     return last_runs(deck)

@@ -72,6 +72,7 @@ def figure(linearized: Linearized) -> Any:
 
 
 def _frequencies(linearized: Linearized) -> np.ndarray:
+    """The frequencies of a curve, rad/s, up to half of the sampling rate."""
     highest = math.pi / linearized.seconds
     return np.geomspace(highest / 10.0**DECADES, highest, POINTS)
 

@@ -123,4 +123,5 @@ def _labelling(name: str) -> str:
 
 
 def _differ(a: Path, b: Path) -> str:
+    """Help that names the command that compares two archives."""
     return f"`met diff {quoted(a)} {quoted(b)}` says what differs"

@@ -180,10 +180,12 @@ def hull(points: np.ndarray) -> np.ndarray:
 
 
 def _side(a: np.ndarray, b: np.ndarray, c: np.ndarray) -> float:
+    """Twice the area of the triangle of three points of a plane; above 0 if c is left of the way from a to b."""
     return float((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]))
 
 
 def _axes(azimuth: float, elevation: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Right, up and back (to the eye) in the world, z up, of a view from this direction, rad."""
     ca, sa, ce, se = math.cos(azimuth), math.sin(azimuth), math.cos(elevation), math.sin(elevation)
     back, right = np.array([ce * ca, ce * sa, se]), np.array([-sa, ca, 0.0])
     return right, np.cross(back, right), back
@@ -330,12 +332,14 @@ def _draw(axes: Any, pictured: Sequence[PicturedSolid], view: Viewpoint, pale: f
 
 
 def _colour(solid: PicturedSolid) -> str:
+    """The colour of a solid: of a joint that of its line in plots, of others by what they are."""
     if solid.role == "joint" and solid.joint >= 0:
         return JOINTS[solid.joint % len(JOINTS)]
     return {"link": LINK, "payload": PAYLOAD}.get(solid.role, BASE)
 
 
 def _mixed(colour: str, light: float, pale: float) -> tuple[float, float, float]:
+    """A colour `#rrggbb` as red, green and blue, 0 to 1, lit and then made paler. pale: share of white, 0 to 1"""
     r, g, b = (
         (1.0 - pale) * min(1.0, light * int(colour[digit : digit + 2], 16) / 255.0) + pale for digit in (1, 3, 5)
     )  # towards white paper

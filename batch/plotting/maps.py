@@ -114,7 +114,7 @@ def description(map_layout: MapLayout, metrics: Sequence[MapMetric], third: Case
 
 
 def _stands(metrics: Sequence[MapMetric], map_layout: MapLayout) -> str:
-    """Which case stands for a cell that holds several, in words."""
+    """Words for the case that stands for a cell of a map in which several cases lie."""
     if map_layout.other is not None:
         return "the one that differs most"
     judged = {bool(metric.column.limits) for metric in metrics}
@@ -123,6 +123,7 @@ def _stands(metrics: Sequence[MapMetric], map_layout: MapLayout) -> str:
 
 
 def _about(metric: MapMetric, map_layout: MapLayout) -> str:
+    """The heading of a metric's map: its description, and the number of cases without a finite number."""
     if map_layout.other is not None:
         return metric.column.about or metric.column.label
     return " · ".join(part for part in (metric.about, _lost(metric)) if part)
@@ -140,6 +141,7 @@ def _lost(metric: MapMetric) -> str:
 
 
 def _values(metric: MapMetric, map_layout: MapLayout) -> np.ndarray:
+    """The numbers that a map shows, [case]: the metric, or its difference from another archive."""
     return metric.values if map_layout.other is None else metric.difference
 
 
@@ -159,6 +161,7 @@ def _tones(metric: MapMetric, map_layout: MapLayout, values: np.ndarray) -> tupl
 
 
 def _colours(map_layout: MapLayout) -> Any:
+    """matplotlib's colour map for metrics, with colours beyond its ends; for differences, one that parts at zero."""
     import matplotlib
 
     if map_layout.other is not None:

@@ -188,4 +188,5 @@ def _newline_as_archived(deck: str, archived: str) -> str:
 
 
 def _other(message: str, help: str) -> Problem:
+    """The problem that a deck is not the one that was run, or is not to be written to."""
     return Problem(error("E398", message, help=help))

@@ -204,7 +204,7 @@ def sweep_lines(question: FitQuestion, answer: FitAnswer, count: int = 200) -> I
 
 
 def as_data(question: FitQuestion, answer: FitAnswer) -> dict[str, Any]:
-    """Plain data; a number that is not finite is null. SI"""
+    """The answer of a fit for JSON, in SI: its numbers, doubts and residuals; a number that is not finite is null."""
     fit = answer.fit
     parameters = [
         {
@@ -233,7 +233,8 @@ def as_data(question: FitQuestion, answer: FitAnswer) -> dict[str, Any]:
 
 
 def identifiable_data(question: FitQuestion, known: Known, promised: Sequence[Promise]) -> dict[str, Any]:
-    """Plain data; a number that is not finite is null. SI"""
+    """Known and unknown numbers of a fit for JSON, in SI, before anything is fitted; a number that is not finite is
+    null."""
     parameters = [
         {"path": path, "deck": float(start), "deviation": float(whole), "alone": float(alone), "known": verdict}
         for path, start, whole, alone, verdict in zip(
@@ -274,6 +275,7 @@ def _comparisons(runs: Sequence[Any], pairs: Any) -> list[dict[str, Any]]:
 
 
 def _as_paths(question: FitQuestion, known: Known) -> list[dict[str, float]]:
+    """The changes of several numbers that leave no mark in the logs, for JSON: how far each goes, SI, by its path."""
     return [{question.paths[place]: part for place, part in change.items()} for change in known.together]
 
 
@@ -316,6 +318,7 @@ def _residual_lines(title: str, before: Comparison, after: Comparison, doubts: S
 
 
 def _deck_value(question: FitQuestion, place: int) -> str:
+    """The deck's value of the estimated number at this place, with its unit."""
     return WrittenValue("", float(f"{question.start[place]:.6g}"), question.units[place]).text
 
 
@@ -372,12 +375,13 @@ def _all_doubts(question: FitQuestion, answer: FitAnswer) -> list[list[str]]:
 
 
 def is_certain(question: FitQuestion, answer: FitAnswer) -> bool:
-    """Whether all numbers are known, the only ones, and of logs without a doubt."""
+    """True if a fit found all its numbers, no others explain the logs as well, and no log is doubtful."""
     known = set(answer.known.verdict) == {"known"} and answer.fit.converged and answer.fit.rival is None
     return known and not any(_all_doubts(question, answer))
 
 
 def _short(si: float, unit: str) -> str:
+    """A number in SI as a text of two digits in this unit: `0.0012 N*m`; "unknown" if it is not finite."""
     if not math.isfinite(si):
         return "unknown"
     (text,) = decimals([float(f"{si:.2g}")], unit)

@@ -139,15 +139,18 @@ def no_limit(loop: OpenLoop) -> str:
 
 
 def _at_frequency(margins: LoopMargins | None, name: str) -> str:
+    """The frequency at which a margin is, as `, at 3.2 Hz`. name: the field of `LoopMargins` that has it, rad/s"""
     w = None if margins is None else getattr(margins, name)
     return "" if w is None else f", at {w / (2.0 * math.pi):.4g} Hz"
 
 
 def _time(seconds: float) -> str:
+    """A duration as `4 ms` or `1.2 s`."""
     return f"{1e3 * seconds:.4g} ms" if seconds < 1.0 else f"{seconds:.4g} s"
 
 
 def _complex(z: complex) -> str:
+    """A pole, for its conjugate too: `0.980000 ± 0.010000i`."""
     return f"{z.real:.6f}" if z.imag == 0.0 else f"{z.real:.6f} ± {z.imag:.6f}i"
 
 
@@ -210,6 +213,7 @@ def answered(question: LinearQuestion) -> list[Answer]:
 
 
 def _why_not(refused: Problem) -> str:
+    """The reason why a case has no linear answer, without the case's name before it."""
     message = refused.diagnostics[0].message
     return message.partition(": ")[2] or message
 

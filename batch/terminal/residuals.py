@@ -16,7 +16,7 @@ SHOWN = 8
 
 
 def as_data(comparison: Comparison) -> dict[str, Any]:
-    """Plain data; a number that is not finite is null."""
+    """The residuals of a log for JSON; a number that is not finite is null."""
     return finite(dataclasses.asdict(comparison))
 
 
@@ -48,12 +48,14 @@ def residual_lines(comparison: Comparison) -> Iterator[str]:
 
 
 def _whiteness(residual: Residual) -> str:
+    """A word on a channel's residual: "white" if its numbers are independent, or why that cannot be told."""
     if residual.white is None:
         return "equal" if residual.rms == 0.0 else "constant" if residual.rows >= FEWEST else "too few"
     return "white" if residual.white else f"not white ({residual.correlation:.2g})"
 
 
 def _size(cause: FollowedCause) -> str:
+    """The size of what a residual follows, signed, with its unit; "" where it has none."""
     if cause.size is None:
         return ""
     unit = "" if cause.unit == "1" else f" {cause.unit}"

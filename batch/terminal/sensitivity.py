@@ -15,7 +15,7 @@ BAR = 20
 
 
 def as_data(sensitivity: Sensitivity) -> dict[str, Any]:
-    """Plain data; a number that is not finite is null."""
+    """The sensitivity of a metric for JSON; a number that is not finite is null."""
     plain = dataclasses.asdict(sensitivity)
     del plain["inputs"], plain["shares"]
     inputs = [

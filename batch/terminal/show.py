@@ -257,6 +257,7 @@ def heading(group: ArchiveGroup, width: int) -> list[str]:
 
 
 def _again(group: ArchiveGroup) -> str:
+    """The command that runs a case of an archive's group again."""
     return f"`met run {quoted(group.path)} --case '#{group.at('case', [0])[0]}'`"
 
 
@@ -310,7 +311,7 @@ def warning_lines(summary: Summary, width: int) -> Iterator[str]:
 
 
 def _counts(summary: Summary) -> str:
-    """How many cases reached their end, in words."""
+    """Words on the number of cases that reached their end, and that failed."""
     if summary.cases == 1:
         return "the case failed" if summary.failed else "the case reached its end"
     done = summary.cases - summary.failed

@@ -55,6 +55,7 @@ def design_answer(archive: ArchiveFile, pool: Pool) -> DesignAnswer | None:
 
 
 def _table(cells: list[list[str]], right: list[int]) -> TextTable:
+    """A table of cells whose first row has the heads and second the units. right: columns that are flush right"""
     heads, units, *rows = cells
     return TextTable(tuple(heads), tuple(units), tuple(map(tuple, rows)), frozenset(right))
 
@@ -77,6 +78,7 @@ def design_map(designs: Designs, best: int) -> DesignMap | None:
 
 
 def _sentence(text: str) -> str:
+    """A text with a capital at its beginning."""
     return text[:1].upper() + text[1:]
 
 

@@ -107,6 +107,7 @@ def gather(
 
 
 def _stem(deck: str) -> str:
+    """The name of a deck's file without its ending, `two_link`, for the title of a page."""
     return PurePath(deck.strip("<>")).stem or deck
 
 
@@ -281,7 +282,7 @@ def _sources(archive: ArchiveFile) -> Iterator[SourceListing]:
 
 
 def _provenance(archive: ArchiveFile, groups: Sequence[ArchiveGroup]) -> Iterator[Fact]:
-    """Where the archive comes from: its file, deck, commit, versions and keys, a fact each."""
+    """The provenance of an archive, a fact each: its file, deck, MET's commit, versions of packages, and keys."""
     provenance = archive.provenance
     changed = {"yes": ", with changes that were not committed", "unknown": ""}.get(str(provenance.get("git_dirty")), "")
     yield from [

@@ -79,6 +79,7 @@ def _row(path: str, quantity: Quantity, spans: Mapping[int, tuple[float, float]]
 
 
 def _origin_text(origin: Origin) -> str:
+    """A word for where a parameter's value is from, with its note."""
     if origin.kind == "case":
         return SAID["case"]
     return f"{SAID[origin.kind]}: {origin.note}" if origin.note else SAID[origin.kind]

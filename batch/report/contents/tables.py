@@ -148,6 +148,7 @@ def structures(pool: Pool, before: EarlierCases | None = None) -> TextTable | No
 
 
 def _good(ended: np.ndarray) -> str:
+    """The number and share of cases that met all or reached their end. ended: places in `pool.ENDED`"""
     good = int(np.isin(ended, GOOD).sum())
     return f"{good:,} ({100 * good / max(1, len(ended)):.3g} %)"
 

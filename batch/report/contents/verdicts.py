@@ -128,6 +128,7 @@ def _report_warnings(pool: Pool, experiments: Mapping[str, Experiment]) -> tuple
 
 
 def _of_step_error(step_error: StepErrorVerdict) -> str:
+    """A sentence on whether the run's error by the step is as small as the deck requires."""
     return f"{step_error.text}: {step_error.word}, {step_error.reason}."
 
 

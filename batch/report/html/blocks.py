@@ -93,6 +93,7 @@ def command(words: str) -> Html:
 
 
 def _again(words: str, commands: Sequence[str]) -> Html:
+    """Commands that run something again, under these words."""
     return join(
         [el("p", words, cls="said"), *(el("p", command(command_text), cls="command") for command_text in commands)]
     )
@@ -130,6 +131,7 @@ def mark(ok: bool) -> Html:
 
 
 def _drawn(path: str) -> Html:
+    """A sign of 16 by 16, drawn as an SVG path."""
     return el("svg", el("path", d=path), cls="mark", viewBox="0 0 16 16", aria_hidden="true")
 
 
@@ -224,6 +226,7 @@ def _moves(flows: Sequence[RequirementFlow], *, better: bool) -> Html:
 
 
 def _parts(verdict_part: Verdict) -> Html:
+    """The outcomes of a verdict's cases as a bar over its legend."""
     order = {"met": "good", "done": "good", "missed": "bad", "unknown": "open"}
     return _bar_of(
         [(order.get(part.word, "lost"), WORDS.get(part.word, part.word), part.count) for part in verdict_part.parts]
@@ -387,6 +390,7 @@ def varied(parameters: Sequence[VariedParameter], anchors: Anchors) -> Html | No
 
 
 def _sets(paths: Sequence[str]) -> list[Child]:
+    """The first of the paths that a varied parameter sets, and the number of the others."""
     shown_paths = [part for path in paths[:3] for part in (", ", el("code", path))][1:]
     return [*shown_paths, f" and {len(paths) - 3} more" if len(paths) > 3 else None]
 

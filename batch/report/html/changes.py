@@ -76,6 +76,7 @@ def _deck(deck_change: DeckTextChange) -> Html:
 
 
 def _noted(notes: Sequence[str]) -> Html | None:
+    """Sentences in a box; None where there are none."""
     return el("div", [el("p", line) for line in notes], cls="note") if notes else None
 
 

@@ -164,6 +164,7 @@ def _map(case_map: Map) -> dict[str, Any]:
 
 
 def _ruler(ruler: Ruler) -> dict[str, Any]:
+    """The data of a map's side: edges of its cells, 0 to 1, and texts by their positions."""
     return {
         "edges": list(ruler.edges),
         "ticks": [[[position, visible(text)] for position, text in tick] for tick in ruler.ticks],
@@ -264,6 +265,7 @@ def _arm(structure: SimulatedStructure) -> dict[str, Any]:
 
 
 def _digest(meshes: list[dict[str, Any]]) -> str:
+    """The name of an arm's meshes on a page: the SHA-256 of their data."""
     return hashlib.sha256(json.dumps(meshes).encode()).hexdigest()
 
 
