@@ -31,6 +31,20 @@ def path_of(output: str | os.PathLike[str]) -> Path:
     return Path(output)
 
 
+def check_ending(output: Path, endings: Sequence[str], *, code: str, kinds: str, more: Sequence[str] = ()) -> None:
+    """Refuse a file's name with an ending of other files. A folder is not looked at: `check_place` refuses it.
+
+    endings  that suit;  the first is proposed instead
+    code     of the error;  kinds: the end of its message, as "pictures are PNG, SVG or PDF files"
+    more     further remedies
+
+    Raises Problem; OSError where the system does not let it look.
+    """
+    if output.suffix.lower() not in endings and not output.is_dir():
+        helps = [f"`-o {quoted(output.with_suffix(endings[0]))}`"] if output.name else []
+        raise Problem(error(code, f"cannot write {output}: {kinds}", help=[*helps, *more]))
+
+
 def check_place(output: Path, *, code: str, inside: Path | None = None) -> None:
     """Refuse a path at which no file can be written: a folder, a pipe, a path in a folder that is not there.
 

@@ -8,7 +8,7 @@ from typing import Any
 from met.diagnostic import Problem, error
 from met.host.files import open_regular, whole_file
 from met.messages.visible import visible
-from met.outputs import check_overwrite, check_place, quoted, writing
+from met.outputs import check_ending, check_overwrite, check_place, writing
 
 SOFTWARE = "MET"
 MOST_DOTS = 200_000_000
@@ -32,9 +32,7 @@ MARKS = {
 def check(output: Path) -> None:
     """Refuse to overwrite a file that is not a picture of MET's. Raises Problem E305; E326 for another ending."""
     with writing(output, code="E305"):
-        if output.suffix.lower() not in METADATA and not output.is_dir():
-            helps = [f"`-o {quoted(output.with_suffix('.png'))}`"] if output.name else []
-            raise Problem(error("E326", f"cannot write {output}: pictures are PNG, SVG or PDF files", help=helps))
+        check_ending(output, tuple(METADATA), code="E326", kinds="pictures are PNG, SVG or PDF files")
         check_place(output, code="E305", inside=output / "plot.png")
         check_overwrite(output, own, code="E305", because=" and was not drawn by MET")
 

@@ -17,7 +17,7 @@ from met.diagnostic import Problem, error
 from met.frozen import frozen
 from met.host.files import open_regular, whole_file
 from met.host.sources import names_archive, names_plan
-from met.outputs import ELSEWHERE, check_overwrite, check_place, quoted, writing
+from met.outputs import ELSEWHERE, check_ending, check_overwrite, check_place, quoted, writing
 from met.plan import Experiment
 from met.run import prepare
 
@@ -109,9 +109,7 @@ def _write(path: Path, data: bytes) -> None:
 
 def check_page(output: Path) -> None:
     """Refuse a place for a page before anything is computed. Raises Problem E474, E475."""
-    if output.suffix.lower() not in (".html", ".htm") and not output.is_dir():
-        helps = [f"`-o {quoted(output.with_suffix('.html'))}`"] if output.name else []
-        raise Problem(error("E475", f"cannot write {output}: pages are HTML files", help=helps))
+    check_ending(output, (".html", ".htm"), code="E475", kinds="pages are HTML files")
     with writing(output, code="E474", help=ELSEWHERE):
         check_place(output, code="E474", inside=output / "view.html")
         check_overwrite(output, _is_page, code="E474", because=" and was not written by `met view`")

@@ -49,12 +49,12 @@ def report(
     from batch.report.contents.against import ComparedArchive, display_names, rename_archives
     from batch.report.contents.gathering import gather
     from batch.report.html.page import page
-    from batch.report.writing import check, default, write
+    from batch.report.writing import check, write
 
     if tolerances and against is None:
         raise ValueError("tolerances are for a comparison: against which archive?")
     archive = Path(path)
-    target = default(archive) if output is None else path_of(output)
+    target = archive.with_suffix(".html") if output is None else path_of(output)
     with ExitStack() as stack:
         file = stack.enter_context(ArchiveFile(archive))
         file.need_every_row("a report")

@@ -5,28 +5,19 @@ from __future__ import annotations
 from pathlib import Path
 
 from batch.report.html.page import GENERATOR
-from met.diagnostic import Problem, error
 from met.host.files import open_regular, whole_file
-from met.outputs import ELSEWHERE, check_overwrite, check_place, quoted, writing
+from met.outputs import ELSEWHERE, check_ending, check_overwrite, check_place, writing
 
-ENDINGS = (".html", ".htm")
 HEAD_BYTES = 400
 """Number of bytes at the beginning of a page that name its program."""
-
-
-def default(archive: Path) -> Path:
-    """The default path of a report, beside the archive: `two_link.gains.html`."""
-    return archive.with_suffix(".html")
 
 
 def check(output: Path) -> None:
     """Refuse a place before anything is computed. Raises Problem E380, or E381 where the name is not that of a page."""
     with writing(output, code="E380", help=ELSEWHERE):
-        if output.suffix.lower() not in ENDINGS and not output.is_dir():
-            helps = [f"`-o {quoted(output.with_suffix('.html'))}`"] if output.name else []
-            if output.suffix.lower() == ".pdf":
-                helps.append("a browser prints the page to PDF: everything is open then, and light")
-            raise Problem(error("E381", f"cannot write {output}: reports are HTML files", help=helps))
+        printed = ["a browser prints the page to PDF: everything is open then, and light"]
+        more = printed if output.suffix.lower() == ".pdf" else []
+        check_ending(output, (".html", ".htm"), code="E381", kinds="reports are HTML files", more=more)
         check_place(output, code="E380", inside=output / "report.html")
         check_overwrite(output, is_report, code="E380", because=" and is no report of MET")
 
