@@ -44,10 +44,9 @@ def sensitivity(
             other = files.enter_context(ArchiveFile(against))
             other.need_every_row("what a change depends on")
             both, _, _ = match_experiments(other, file)
-            pairs = {
-                group_b.name: (group_a, *(matched := match_cases(group_a, group_b), matched.a, matched.b)[1:])
-                for group_a, group_b in both
-            }
+            for group_a, group_b in both:
+                matched = match_cases(group_a, group_b)
+                pairs[group_b.name] = (group_a, matched.a, matched.b)
         for group in groups:
             if against is not None and group.name not in pairs:
                 helps = "name one that both have: `--run NAME`"

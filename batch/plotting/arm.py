@@ -210,7 +210,8 @@ PALE = 0.62
 """Share of the paper's colour in the first drawn instant; less in each later one."""
 
 JOINTS = COLOURS[:-1]
-EDGE, GLEAM = 0.55, 0.5
+EDGE = 0.55
+"""Light on the edges of facets, relative to their colour."""
 
 
 def arm_picture(

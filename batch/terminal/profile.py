@@ -9,8 +9,6 @@ from ic.printing.columns import columns, count, size
 from met.analysis.profile import RunProfile, WorkCost
 from met.plan import Experiment
 
-EVENTS = "friction events"
-
 
 def profile_lines(profile: RunProfile, experiment: Experiment) -> Iterator[str]:
     """The profile in lines."""
@@ -51,7 +49,7 @@ def _table(profile: RunProfile) -> Iterator[tuple[str, ...]]:
                     yield _row(f"  {part.part}", [part], profile.ns, times=False)
     events = [part for part in profile.parts if part.event and part.calls > 0.0]
     if events:
-        yield _row(EVENTS, events, profile.ns, times=False)
+        yield _row("friction events", events, profile.ns, times=False)
     yield _row("all parts, each alone", profile.parts, profile.ns, times=False)
     yield "the whole run", "", "", "", _number(profile.ns), "100 %"
 

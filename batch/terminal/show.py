@@ -44,7 +44,7 @@ from met.plan.columns import blocks
 
 MOST_GROUPS = 4
 """Largest number of structures of a sweep that are shown in full unless they are named; with more, only their table is
-shown."""
+shown, and after a run also what failed."""
 
 NARROWEST = 40
 """Smallest width in characters of a line beside a name, however long that is."""

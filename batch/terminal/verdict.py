@@ -16,7 +16,7 @@ from batch.queries.pool import failure_lines
 from batch.queries.search_result import SearchResult
 from batch.queries.step_errors.figures import HINT
 from batch.queries.summary import Summary, as_json, finite
-from batch.terminal.show import verdict, warning_lines
+from batch.terminal.show import MOST_GROUPS, verdict, warning_lines
 from ic.printing.columns import count
 from ic.printing.columns import size as size_text
 from ic.sweeps.confidences import OF_CASES
@@ -29,9 +29,6 @@ if TYPE_CHECKING:
 
 WORST = 3
 """Number of cases of a sweep that the verdict names."""
-
-MOST_GROUPS = 4
-"""Largest number of structures of a sweep that are reported in full; with more, only the table, and failures."""
 
 
 # Before the run

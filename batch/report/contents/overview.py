@@ -28,8 +28,6 @@ MOST_CAUSES = 300
 KEPT = 200
 """Number of the worst cases that are always drawn."""
 
-BAD_CASE = "case"
-
 
 def overview(pool: Pool, before: EarlierCases | None = None) -> Overview | None:
     """The points of a sweep; None where there is one case, or no metric. before: its cases in the archive it is
@@ -37,7 +35,7 @@ def overview(pool: Pool, before: EarlierCases | None = None) -> Overview | None:
     metrics, varied = pool.metrics(), pool.varied()
     if pool.count < 2 or not metrics:
         return None
-    table = CaseColumn(BAD_CASE, "case", "", "case", pool.cases.astype(float))
+    table = CaseColumn("case", "case", "", "case", pool.cases.astype(float))
     against = (*varied, *(() if len(varied) > 1 else (table,)))
     changes: tuple[CaseColumn, ...] = ()
     if before is not None:

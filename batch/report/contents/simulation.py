@@ -51,7 +51,7 @@ def simulation(
     before  another archive to compare with: its program of these cases is there too, where its plan can be read here
     meshes  whether links are drawn by their meshes
     """
-    groups = [group for group in pool.groups[:MOST_STRUCTURES] if group.name in experiments]
+    groups = {n: group for n, group in enumerate(pool.groups[:MOST_STRUCTURES]) if group.name in experiments}
     if not groups:
         return None
     others = pool.cases[pool.worst_first]
@@ -59,9 +59,7 @@ def simulation(
     numbers = np.array(list(dict.fromkeys([*first, *others.tolist()])), np.int64)
     structures, left = [], MOST_EXACT
     earlier = {} if before is None else before.experiments()
-    for number, group in enumerate(pool.groups):
-        if group not in groups:
-            continue
+    for number, group in groups.items():
         of_group = pool.group_of == number
         mine = numbers[np.isin(numbers, pool.cases[of_group])]
         sources = drawn.sources[number]
