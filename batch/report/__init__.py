@@ -12,7 +12,11 @@ import os
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from met.outputs import path_of
+from met.host.files import open_regular, whole_file
+from met.outputs import ELSEWHERE, check_ending, check_overwrite, check_place, path_of, writing
+
+HEAD_BYTES = 400
+"""Number of bytes at the beginning of a page that name its program."""
 
 
 def report(
@@ -49,7 +53,6 @@ def report(
     from batch.report.contents.against import ComparedArchive, display_names, rename_archives
     from batch.report.contents.gathering import gather
     from batch.report.html.page import page
-    from batch.report.writing import check, write
 
     if tolerances and against is None:
         raise ValueError("tolerances are for a comparison: against which archive?")
@@ -58,7 +61,7 @@ def report(
     with ExitStack() as stack:
         file = stack.enter_context(ArchiveFile(archive))
         file.need_every_row("a report")
-        check(target)
+        _check(target)
         other = None
         if against is not None:
             from batch.differences.campaigns import diff
@@ -70,9 +73,28 @@ def report(
             other = ComparedArchive(stack.enter_context(ArchiveFile(Path(against))), diff_)
         contents = gather(file, experiments, title, progress, other, simulate=simulate, meshes=meshes)
         text = page(contents)
-    write(target, text)
+    with writing(target, code="E380", help=ELSEWHERE), whole_file(target) as page_file:
+        page_file.write(text.encode("utf-8"))
     played = [section.simulation.structures for section in contents.sections if section.simulation is not None]
     for words in dict.fromkeys(structure.arm.meshes.words for structures in played for structure in structures):
         if words:
             tell(words)
     return target
+
+
+def _check(output: Path) -> None:
+    """Refuse a place before anything is computed. Raises Problem E380, or E381 where the name is not that of a page."""
+    with writing(output, code="E380", help=ELSEWHERE):
+        printed = ["a browser prints the page to PDF: everything is open then, and light"]
+        more = printed if output.suffix.lower() == ".pdf" else []
+        check_ending(output, (".html", ".htm"), code="E381", kinds="reports are HTML files", more=more)
+        check_place(output, code="E380", inside=output / "report.html")
+        check_overwrite(output, _is_report, code="E380", because=" and is no report of MET")
+
+
+def _is_report(path: Path) -> bool:
+    """True if a file is marked as a page of MET's."""
+    from batch.report.html.page import GENERATOR
+
+    with open_regular(path) as file:
+        return f'<meta name="generator" content="{GENERATOR}">'.encode() in file.read(HEAD_BYTES)
