@@ -8,6 +8,7 @@ from typing import Any
 import click
 
 from batch.cli.quantities import SECONDS, Quantity, measured
+from batch.cli.run import until_terminated
 from met.cli import NO, YES, FiniteRange, check_options, deck_options, format_option, loudness_options
 from met.diagnostic import Problem
 
@@ -300,12 +301,6 @@ def run(source: str, names: tuple[str, ...], **options: Any) -> int:
     not all did; 2 the input is wrong.
     """
     from batch.beds.running import run_and_tell
-    from batch.executors.termination import TERMINATED, Terminated, terminable
 
     check_options(source, names, False, options["defines"], options["include_dirs"], options["settings"])
-    try:
-        with terminable():
-            return YES if run_and_tell(source, names, **options) else NO
-    except Terminated:
-        click.echo("\nmet: terminated", err=True)
-        return TERMINATED
+    return until_terminated(run_and_tell, source, names, **options)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import glob
+from collections.abc import Callable
 from typing import Any
 
 import click
@@ -93,15 +94,21 @@ def run(source: str, names: tuple[str, ...], form: str, **options: Any) -> int:
     resumed. Of an archive, cases are run again, to the same bits. Exit status: 0 all cases reached their end and met
     the requirements; 1 not all did; 2 the input is wrong, and nothing was written.
     """
-    from batch.executors.termination import TERMINATED, Terminated, terminable
     from batch.terminal.running import run_and_tell
 
     check_options(
         source, names, options["everything"], options["defines"], options["include_dirs"], options["settings"]
     )
+    return until_terminated(run_and_tell, source, names, json=form == "json", **options)
+
+
+def until_terminated(run_and_tell: Callable[..., bool], *arguments: Any, **options: Any) -> int:
+    """Run cases until they are done or a signal terminates the command; returns the exit status."""
+    from batch.executors.termination import TERMINATED, Terminated, terminable
+
     try:
         with terminable():
-            return YES if run_and_tell(source, names, json=form == "json", **options) else NO
+            return YES if run_and_tell(*arguments, **options) else NO
     except Terminated:
         click.echo("\nmet: terminated", err=True)
         return TERMINATED
