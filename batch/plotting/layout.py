@@ -273,7 +273,7 @@ def title(figure: Any, archive: ArchiveFile, name: str, below: str, sheet: Pictu
             figure.suptitle(text, x=0.012, ha="left", fontsize=sheet.small, color=INK)
         return
     line = visible(f"{PurePath(archive.deck.strip('<>')).name} · {name}")
-    lines = textwrap.wrap(below, letters(sheet, figure.get_figwidth() - 0.3)) if below else []
+    lines = textwrap.wrap(below, letters(sheet, figure.get_figwidth() - 0.3))
     spare = "\n" * len(lines)
     figure.suptitle(f"{line}{spare}", x=0.012, ha="left", fontsize=12, fontweight="bold", linespacing=1.5)
     for number, title_line in enumerate(lines):

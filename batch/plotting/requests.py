@@ -146,8 +146,8 @@ def _varied_text(known: Sequence[str]) -> str:
 
 
 def colour_column(pool: Pool, drawn: Sequence[CaseColumn]) -> CaseColumn | None:
-    """The column that colours points over one parameter: the varied one with most values that is not in step with
-    it."""
+    """The column that colours points over one parameter: the varied one with most values that is not in step with it;
+    None where nothing else is varied."""
     for column in pool.varied():
         if all(column is not drawn_column for drawn_column in drawn) and is_independent(column, drawn[0]):
             return column
@@ -190,7 +190,7 @@ def draw(
     if files is not None and matched < pool.count:
         count += f", {matched:,} of them also in {files[1]}"
     if len(axes_columns) < 2:
-        by = colour_column(pool, axes_columns) if axes_columns else None
+        by = colour_column(pool, axes_columns)
         figure = _points(pool, metrics, axes_columns[0] if axes_columns else None, by, sheet, files)
         drawn = {column.key for column in (*axes_columns, by) if column is not None}
         besides = [

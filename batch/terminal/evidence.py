@@ -116,13 +116,8 @@ def _half(
 
 def _short(cell: str) -> str:
     """A shortened cell: `at least 99.42 %` as `≥ 99.42 %`, `99 % with 90 %` as `99 %, 90 %`."""
-    for words, sign in (
-        ("at least", "\N{GREATER-THAN OR EQUAL TO}"),
-        ("at most", "\N{LESS-THAN OR EQUAL TO}"),
-        (" with", ","),
-    ):
-        cell = cell.replace(words, sign)
-    return cell
+    signs = cell.replace("at least", "\N{GREATER-THAN OR EQUAL TO}").replace("at most", "\N{LESS-THAN OR EQUAL TO}")
+    return signs.replace(" with", ",")
 
 
 def _numbers(rows: Sequence[RequirementEvidence], required: Sequence[str]) -> Iterator[str]:

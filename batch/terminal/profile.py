@@ -60,7 +60,8 @@ def _row(name: str, parts: Sequence[WorkCost], whole: float, *, times: bool = Tr
     return (
         name,
         _number(max(part.calls for part in parts)) if times else "",
-        *(_number(sum(numbers)) for numbers in ([p.operations for p in parts], [p.flops for p in parts])),
+        _number(sum(part.operations for part in parts)),
+        _number(sum(part.flops for part in parts)),
         _number(ns),
         _percent(ns / whole),
     )

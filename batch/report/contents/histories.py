@@ -305,16 +305,24 @@ class _Group:
     def sources(self, page_panels: Sequence[SignalPanel]) -> tuple[tuple[str, ...], ...]:
         """The channel of each line of each of the page's panels; "" where this structure has none."""
         out = [[""] * len(panel.lines) for panel in page_panels]
-        keys = [(panel.name, panel.unit) for panel in page_panels]
+        for place, panel, commands, places in self._on_page(page_panels):
+            channels = [self._channel(panel.variable, column) for column in panel.columns]
+            channels += [self._channel(command.variable, command.column) for command in commands]
+            for line, channel in zip(places, channels, strict=True):
+                out[place][line] = channel
+        return tuple(map(tuple, out))
+
+    def _on_page(
+        self, page_panels: Sequence[SignalPanel]
+    ) -> Iterator[tuple[int, Panel, list[CommandCurve], list[int]]]:
+        """The panels of this structure that the page has: the place there, the panel, the commands in it, and the place
+        of each line, of the panel and then of the commands, among those of the page's panel."""
+        places = {(panel.name, panel.unit): n for n, panel in enumerate(page_panels)}
         for panel in self.panels:
             key = panel.name, panel.unit
-            if key in keys:
-                place = keys.index(key)
-                channels = [self._channel(panel.variable, column) for column in panel.columns]
-                channels += [self._channel(command.variable, command.column) for _, command in self.commands[key]]
-                for line, channel in zip(self.described(panel).lines, channels, strict=True):
-                    out[place][page_panels[place].lines.index(line)] = channel
-        return tuple(map(tuple, out))
+            if key in places:
+                lines = map(page_panels[places[key]].lines.index, self.described(panel).lines)
+                yield places[key], panel, [command for _, command in self.commands[key]], list(lines)
 
     def _channel(self, variable: str, column: int) -> str:
         stored = self.group.variables[variable]
@@ -324,18 +332,12 @@ class _Group:
         """The lines of each of the page's panels, by its place: (point, line of that panel), not a number where this
         structure has none."""
         out = {}
-        for panel in self.panels:
-            key = panel.name, panel.unit
-            place = next((n for n, panel in enumerate(page_panels) if (panel.name, panel.unit) == key), None)
-            if place is None:
-                continue
+        for place, panel, commands, places in self._on_page(page_panels):
             own = [history(self.group, panel, position)]
-            own += [command.values(self.group, position)[:, None] for _, command in self.commands[key]]
+            own += [command.values(self.group, position)[:, None] for command in commands]
             values = thin(np.concatenate(own, axis=1).astype(np.float64), points)
-            full = np.full((len(values), len(page_panels[place].lines)), np.nan)
-            for column, line in enumerate(self.described(panel).lines):
-                full[:, page_panels[place].lines.index(line)] = values[:, column]
-            out[place] = full
+            out[place] = np.full((len(values), len(page_panels[place].lines)), np.nan)
+            out[place][:, places] = values
         return out
 
 
