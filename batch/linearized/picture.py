@@ -41,9 +41,11 @@ def figure(linearized: Linearized) -> Any:
     """The picture that `draw` writes, a matplotlib Figure. Raises Problem E450."""
     from matplotlib.figure import Figure
 
-    loops = [loop for loop in linearized.loops if loop.loop is not None and loop.returns]
+    highest = math.pi / linearized.seconds
+    w = np.geomspace(highest / 10.0**DECADES, highest, POINTS)
+    curves = [(loop, loop.loop.response(w)) for loop in linearized.loops if loop.loop is not None and loop.returns]
     steps = bool(linearized.inputs and linearized.outputs)
-    if not loops and not steps:
+    if not curves and not steps:
         helps = ("`--open SIGNAL` opens a loop", "`--input SIGNAL --output SIGNAL` asks for a step")
         raise Problem(
             error(
@@ -52,13 +54,13 @@ def figure(linearized: Linearized) -> Any:
                 help=helps,
             )
         )
-    rows = [2.0] * bool(loops) + [1.0] * (len(linearized.outputs) if steps else 0)
+    rows = [2.0] * bool(curves) + [1.0] * (len(linearized.outputs) if steps else 0)
     picture = Figure(figsize=(9.4, 2.1 * sum(rows) + 0.9), dpi=144, layout="constrained")
     grid = picture.add_gridspec(len(rows), 1, height_ratios=rows)
-    if loops:
+    if curves:
         inner = grid[0].subgridspec(2, 2)
-        _bode(picture.add_subplot(inner[0, 0]), picture.add_subplot(inner[1, 0]), loops, linearized)
-        _nichols(picture.add_subplot(inner[:, 1]), loops, linearized)
+        _bode(picture.add_subplot(inner[0, 0]), picture.add_subplot(inner[1, 0]), w, curves)
+        _nichols(picture.add_subplot(inner[:, 1]), curves)
     if steps:
         first = len(rows) - len(linearized.outputs)
         for row, name in enumerate(linearized.outputs):
@@ -71,18 +73,11 @@ def figure(linearized: Linearized) -> Any:
     return picture
 
 
-def _frequencies(linearized: Linearized) -> np.ndarray:
-    """The frequencies of a curve, rad/s, up to half of the sampling rate."""
-    highest = math.pi / linearized.seconds
-    return np.geomspace(highest / 10.0**DECADES, highest, POINTS)
-
-
-def _bode(size: Any, phase: Any, loops: list[OpenLoop], linearized: Linearized) -> None:
-    """Draw size and phase of the opened loops over the frequency, Hz, with the margins marked."""
-    w = _frequencies(linearized)
-    for number, loop in enumerate(loops):
-        assert loop.loop is not None
-        L, colour = loop.loop.response(w), COLOURS[number % len(COLOURS)]
+def _bode(size: Any, phase: Any, w: np.ndarray, curves: Sequence[tuple[OpenLoop, np.ndarray]]) -> None:
+    """Draw size and phase of the opened loops over the frequency, Hz, with the margins marked. w: frequencies, rad/s;
+    curves: the loops with their complex responses there"""
+    for number, (loop, L) in enumerate(curves):
+        colour = COLOURS[number % len(COLOURS)]
         turned = np.degrees(_turned(L))
         size.loglog(w / (2.0 * math.pi), np.abs(L), color=colour, label=loop.paths[0])
         phase.semilogx(w / (2.0 * math.pi), turned, color=colour)
@@ -134,13 +129,10 @@ def _degrees(axis: Any) -> tuple[float, float]:
     return low, high
 
 
-def _nichols(ax: Any, loops: list[OpenLoop], linearized: Linearized) -> None:
-    """Draw size over phase of the opened loops, with the curves on which |S| is 2 and 4."""
-    w = _frequencies(linearized)
-    for number, loop in enumerate(loops):
-        assert loop.loop is not None
-        L, colour = loop.loop.response(w), COLOURS[number % len(COLOURS)]
-        ax.semilogy(np.degrees(_turned(L)), np.abs(L), color=colour)
+def _nichols(ax: Any, curves: Sequence[tuple[OpenLoop, np.ndarray]]) -> None:
+    """Draw size over phase of the opened loops, with the curves on which |S| is 2 and 4. curves: as for `_bode`"""
+    for number, (_, L) in enumerate(curves):
+        ax.semilogy(np.degrees(_turned(L)), np.abs(L), color=COLOURS[number % len(COLOURS)])
     ax.plot(-180.0, 1.0, "+", color=INK, markersize=9)
     for sensitivity, style in ((2.0, "-"), (4.0, "--")):  # |S| is so large on the curve around -1
         turn = np.linspace(0.0, 2.0 * math.pi, 400)
