@@ -77,11 +77,13 @@ def verdict(verdict_part: Verdict, anchors: Anchors, *, tried: bool = False, aga
         _again("Run it again:", [again]) if again else None,
         cls="answer",
     )
-    evidence = [_parts(verdict_part) if verdict_part.cases > 1 else None, _demands(verdict_part)]
-    if verdict_part.failing:
-        evidence.append(_failing(verdict_part.failing, single=verdict_part.cases == 1))
-    evidence += [_warning(warning, anchors) for warning in verdict_part.warnings]
-    evidence += [el("p", note, cls="note") for note in verdict_part.notes]
+    evidence = [
+        _parts(verdict_part) if verdict_part.cases > 1 else None,
+        _demands(verdict_part),
+        _failing(verdict_part.failing, single=verdict_part.cases == 1) if verdict_part.failing else None,
+        [_warning(warning, anchors) for warning in verdict_part.warnings],
+        [el("p", note, cls="note") for note in verdict_part.notes],
+    ]
     kind = "" if tried else " yes" if verdict_part.ok else " no"
     return el("div", answer, el("div", evidence, cls="evidence"), cls=f"verdict{kind}")
 
@@ -419,19 +421,20 @@ def metrics(section: ReportSection) -> Html | None:
     return join([table, legend, by_step])
 
 
-def _metric(row: MetricRow, single: bool, remarks: bool, compared: bool, verified: bool) -> list[Html]:
+def _metric(row: MetricRow, single: bool, remarks: bool, compared: bool, verified: bool) -> list[Child]:
     """The cells of a metric's row. single: there is one case; compared: with earlier values; verified: with errors by
     the step"""
     before = [row.before] if compared else []
     spread = [page_number(getattr(row.spread, column.field)) for column in SPREAD_COLUMNS]
     values = [*before, page_number(row.spread.median)] if single else [*spread, *before]
     values += [row.by_step] if verified else []
-    cells = [el("th", el("code", breaking(row.name)), el("span", row.about, cls="under"), scope="row")]
-    cells += [el("td", value, cls="right") for value in values]
-    cells.append(el("td", row.unit))
-    if not single:
-        cells.append(el("td", histogram(row)))
-    return [*cells, el("td", row.remark)] if remarks else cells
+    return [
+        el("th", el("code", breaking(row.name)), el("span", row.about, cls="under"), scope="row"),
+        [el("td", value, cls="right") for value in values],
+        el("td", row.unit),
+        None if single else el("td", histogram(row)),
+        el("td", row.remark) if remarks else None,
+    ]
 
 
 def histogram(row: MetricRow) -> Html | None:

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from batch.queries.pool import page_number
 from batch.report.contents.parts import DesignAnswer, DesignMap
 from batch.report.html.blocks import command
-from batch.report.html.markup import Child, Html, el, join
+from batch.report.html.markup import Html, el, join
 from batch.report.html.tables import table
 
 SIDE = 320
@@ -21,11 +21,15 @@ SHADES = 4
 def designs(answer: DesignAnswer) -> Html:
     """The answer of `met best`, or of a search."""
     first, *others = [el("p", line, cls="said") for line in answer.why.split("\n")]
-    words: list[Child] = [el("p", answer.headline, cls="pick"), first]
-    if answer.command:
-        words += [el("p", answer.purpose, cls="said"), el("p", command(answer.command), cls="command")]
-    words += [*others, *(el("p", note, cls="note") for note in answer.notes)]
-    words += [table(answer.stretches, "How far each may go")] if answer.stretches is not None else []
+    again = [el("p", answer.purpose, cls="said"), el("p", command(answer.command), cls="command")]
+    words = [
+        el("p", answer.headline, cls="pick"),
+        first,
+        again if answer.command else None,
+        others,
+        [el("p", note, cls="note") for note in answer.notes],
+        table(answer.stretches, "How far each may go") if answer.stretches is not None else None,
+    ]
     head = el("div", el("div", words), _map(answer.map) if answer.map is not None else None, cls="answered")
     about = el("p", answer.about, cls="said")
     return join([head, about, _progress(answer), table(answer.table, answer.title)])
