@@ -153,13 +153,12 @@ def _section(
         drawn = replace(drawn, opens=chosen.case)
     played = None
     if drawn is not None and computed:
-        opens = [] if drawn.opens is None else [drawn.opens]
         first = [
             *drawn.first_cases,
-            *opens,
+            *([] if drawn.opens is None else [drawn.opens]),
             *(case for notable in (best_cases, worst_cases) if notable is not None for case in notable.cases),
+            *([] if before is None else before.most),
         ]
-        first += [] if before is None else before.most
         played = simulation(pool, own, drawn, first, points, before, meshes=meshes)
     errors = together(map(figures, pool.groups))
     return ReportSection(

@@ -125,7 +125,7 @@ def structures(pool: Pool, before: EarlierCases | None = None) -> TextTable | No
     if len(pool.groups) < 2:
         return None
     metrics = pool.metrics()
-    judged = bool(pool.requirements)
+    good = "meet all" if pool.requirements else "reached their end"
     choices = [column for column in pool.columns if column.role == "choice"]
     rows = []
     for number, _ in enumerate(pool.groups):
@@ -137,8 +137,7 @@ def structures(pool: Pool, before: EarlierCases | None = None) -> TextTable | No
             counts.append(_good(before.ended[both]) if len(both) else page_number(np.nan))
         medians = (median_text(column.values[places], infinite="∞", none=page_number(np.nan)) for column in metrics)
         rows.append((*chosen, f"{len(places):,}", *counts, *medians))
-    heads = (*(c.label for c in choices), "cases", "meet all" if judged else "reached their end")
-    heads += ("before",) if before is not None else ()
+    heads = (*(c.label for c in choices), "cases", good, *(("before",) if before is not None else ()))
     return TextTable(
         heads=(*heads, *(f"{c.label}, median" for c in metrics)),
         units=(*[""] * len(heads), *(c.unit for c in metrics)),

@@ -407,10 +407,8 @@ def metrics(section: ReportSection) -> Html | None:
         values = ["before", "now"] if compared else ["value"]
     verified = any(metric.by_step for metric in section.metrics)
     values += ["± by the step"] if verified else []
-    heads = ["metric", *values, "unit"]
-    heads += [] if section.single else ["how often"]
     remarks = any(metric.remark for metric in section.metrics)
-    heads += [""] if remarks else []
+    heads = ["metric", *values, "unit", *(["how often"] if not section.single else []), *([""] if remarks else [])]
     rows = [el("tr", _metric(metric, section.single, remarks, compared, verified)) for metric in section.metrics]
     table = rows_under(
         headings(heads, range(1, len(values) + 1)), rows, "Metrics", cls="few" if section.single else None

@@ -194,8 +194,10 @@ def _worst(changes: RunChanges) -> Html | None:
 
 def _cases(worst: Sequence[WorstCase]) -> Html:
     """The table of the cases that changed most, with the commands that run each again."""
-    heads = headings(("case", "id", "what changed most", "before", "now", "unit"), right={0, 3, 4})
-    heads.append(el("th", "run it again, before and now", scope="col", cls="command"))
+    heads = [
+        *headings(("case", "id", "what changed most", "before", "now", "unit"), right={0, 3, 4}),
+        el("th", "run it again, before and now", scope="col", cls="command"),
+    ]
     rows = [
         el(
             "tr",

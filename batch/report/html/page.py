@@ -61,9 +61,13 @@ def _replay(report: Report, section: ReportSection) -> str:
 def _header(report: Report) -> Html:
     """The head of the page: title, summary, and links to its sections."""
     lede = report.sections[0].lede if len(report.sections) == 1 else f"{len(report.sections)} runs and sweeps."
-    links = [*([("changed", "What changed")] if report.changes is not None else []), ("verdict", _verdict_name(report))]
-    links += [link for n, section in enumerate(report.sections) for link in _links(n, section, report)]
-    links += [("parameters", "Parameters"), ("provenance", "Provenance")]
+    links = [
+        *([("changed", "What changed")] if report.changes is not None else []),
+        ("verdict", _verdict_name(report)),
+        *(link for n, section in enumerate(report.sections) for link in _links(n, section, report)),
+        ("parameters", "Parameters"),
+        ("provenance", "Provenance"),
+    ]
     if report.chosen_design is not None:
         links.sort(key=lambda link: link[0] != "s0-designs")
     items = [el("li", el("a", name, href=f"#{where}")) for where, name in links]
