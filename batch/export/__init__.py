@@ -9,8 +9,7 @@ mcap           for Foxglove and Lichtblick: the arm in 3D, signals, what came of
   case_log      what is logged of a case, and its result
   wire          messages of our own
 layout         what Foxglove shows when it opens one
-case_table     a table of cases: what is varied, metrics, requirements
-evidence_rows  a table of requirements, with what the cases show of each
+tables         a table of cases: what is varied, metrics, requirements; or of requirements, with what the cases show
 csv            a table as text, of cases or of histories
 parquet        the same for other programs; needs pyarrow
 from_run       an export that a run is asked for
@@ -25,6 +24,7 @@ from typing import TYPE_CHECKING, Literal
 
 from batch.export.formats import ExportRequest, Rows, find
 from batch.formats import FORMATS, endings, format_of
+from ic.printing.columns import count
 from met.diagnostic import Problem, error
 from met.frozen import frozen
 from met.outputs import path_of
@@ -85,8 +85,7 @@ def export(
     Raises met.diagnostic.Problem for mistakes that a user can correct.
     """
     from batch.archive.read import ArchiveFile
-    from batch.export import case_table
-    from batch.export.evidence_rows import evidence_columns
+    from batch.export import tables
     from batch.export.output import check
     from batch.export.picking import pick
 
@@ -101,11 +100,11 @@ def export(
         names = [f"#{case}" if isinstance(case, int) else case for case in cases]
         only = writer.tables[0] if len(writer.tables) == 1 else None
         if table == "evidence":
-            required = evidence_columns(file, runs, deck=units == "deck")
+            required = tables.evidence_columns(file, runs, deck=units == "deck")
             written = writer.write_table(file, required, target)
             return Exported(target, written.layout, 0, written.rows, "evidence")
         if (only or table or _row(file, runs, names, signals)) == "metrics":
-            rows = case_table.table(file, runs, names, deck=units == "deck")
+            rows = tables.table(file, runs, names, deck=units == "deck")
             written = writer.write_table(file, rows, target)
             return Exported(target, written.layout, rows.count, written.rows, "metrics")
         picked = pick(file, runs, names, signals)
@@ -125,11 +124,11 @@ def _row(file: ArchiveFile, runs: Sequence[str], cases: Sequence[str], signals: 
 def summary(done: Exported) -> str:
     """The contents of an export in words, for the line that names its file."""
     if done.table == "evidence":
-        return f": evidence, {done.rows:,} row{'s' if done.rows != 1 else ''}, one a requirement at a design point"
-    cases = f"{done.cases:,} case{'s' if done.cases != 1 else ''}"
+        return f": evidence, {count(done.rows, 'row')}, one a requirement at a design point"
+    cases = count(done.cases, "case")
     if done.table == "metrics":
         return f": metrics of {cases}, a row each" + ("; `--histories` writes signals" if done.cases != 1 else "")
-    return f": histories of {cases}, {done.rows:,} row{'s' if done.rows != 1 else ''}"
+    return f": histories of {cases}, {count(done.rows, 'row')}"
 
 
 def format_and_target(

@@ -20,11 +20,10 @@ from pathlib import Path
 import numpy as np
 
 from batch.archive.read import ArchiveFile
-from batch.export.case_table import CaseTable, TableColumn, of_varied, value_of, varied
-from batch.export.evidence_rows import EvidenceColumns
 from batch.export.formats import ExportFormat, ExportRequest, WrittenExport
 from batch.export.output import whole
 from batch.export.picking import ExportedCase, SignalColumn
+from batch.export.tables import CaseTable, EvidenceColumns, TableColumn, value_of, varied_columns
 from met.messages.visible import line
 from met.version import VERSION
 
@@ -59,42 +58,6 @@ def _cell(text: str) -> str:
 def all_columns(cases: Sequence[ExportedCase]) -> list[SignalColumn]:
     """The columns of all the cases: those of one structure may lack some of another's."""
     return list({column.path: column for case in cases for column in case.columns}.values())
-
-
-def write(file: ArchiveFile, cases: Sequence[ExportedCase], output: Path, *, deck: bool = False) -> int:
-    """Write the cases' histories and return the number of rows. deck: varied parameters in the deck's units. Raises
-    Problem E305."""
-    columns, groups = all_columns(cases), list({case.group.name: case.group for case in cases}.values())
-    runs = dict.fromkeys(case.run_name for case in cases)
-    fields = [of_varied(variable, deck=deck) for variable in varied(groups)]
-    numbered = len(cases) > 1 or bool(fields)
-    heads = [*([("run", "")] if len(runs) > 1 else []), *([("case", "1")] if numbered else [])]
-    heads += [*((field.name, field.unit) for field in fields), ("time", "s")]
-    heads += [(column.path, column.unit) for column in columns]
-    with whole(output) as sink:
-        sink.write(memoryview(_head(file, runs, heads)))
-        for case in cases:
-            begin: list[object] = [case.run_name] if len(runs) > 1 else []
-            begin += [case.number] if numbered else []
-            begin += [value_of(field, case.group, case.position) for field in fields]
-            cells = [number_texts(case.time), *_cells(case, columns)]
-            same = _line(begin)
-            rows = "".join(",".join((*same, *row)) + "\n" for row in zip(*cells, strict=True))
-            sink.write(memoryview(rows.encode("utf-8", "replace")))
-            sink.check()
-    return sum(len(case.time) for case in cases)
-
-
-def write_rows(file: ArchiveFile, table: CaseTable | EvidenceColumns, output: Path) -> int:
-    """Write a table of cases, or of evidence, and return the number of its rows. Raises Problem E305."""
-    with whole(output) as sink:
-        sink.write(memoryview(_head(file, table.runs, [(field.name, field.unit) for field in table.fields])))
-        for columns in table.blocks():
-            cells = [_column(field, values) for field, values in zip(table.fields, columns, strict=True)]
-            rows = "".join(",".join(row) + "\n" for row in zip(*cells, strict=True))
-            sink.write(memoryview(rows.encode("utf-8", "replace")))
-            sink.check()
-    return table.count
 
 
 def _head(file: ArchiveFile, runs: Iterable[str], heads: Sequence[tuple[str, str]]) -> bytes:
@@ -146,12 +109,39 @@ class Csv(ExportFormat):
     title = "a CSV file"
 
     def write_table(self, file: ArchiveFile, table: CaseTable | EvidenceColumns, target: Path) -> WrittenExport:
-        return WrittenExport(write_rows(file, table, target))
+        """Write a table of cases, or of evidence. Raises Problem E305."""
+        with whole(target) as sink:
+            sink.write(memoryview(_head(file, table.runs, [(field.name, field.unit) for field in table.fields])))
+            for columns in table.blocks():
+                cells = [_column(field, values) for field, values in zip(table.fields, columns, strict=True)]
+                rows = "".join(",".join(row) + "\n" for row in zip(*cells, strict=True))
+                sink.write(memoryview(rows.encode("utf-8", "replace")))
+                sink.check()
+        return WrittenExport(table.count)
 
     def write_histories(
         self, file: ArchiveFile, cases: Sequence[ExportedCase], target: Path, request: ExportRequest
     ) -> WrittenExport:
-        return WrittenExport(write(file, cases, target, deck=request.units == "deck"))
+        """Write the histories of these cases. Raises Problem E305."""
+        columns, groups = all_columns(cases), list({case.group.name: case.group for case in cases}.values())
+        runs = dict.fromkeys(case.run_name for case in cases)
+        fields = varied_columns(groups, deck=request.units == "deck")
+        numbered = len(cases) > 1 or bool(fields)
+        heads = [*([("run", "")] if len(runs) > 1 else []), *([("case", "1")] if numbered else [])]
+        heads += [*((field.name, field.unit) for field in fields), ("time", "s")]
+        heads += [(column.path, column.unit) for column in columns]
+        with whole(target) as sink:
+            sink.write(memoryview(_head(file, runs, heads)))
+            for case in cases:
+                begin: list[object] = [case.run_name] if len(runs) > 1 else []
+                begin += [case.number] if numbered else []
+                begin += [value_of(field, case.group, case.position) for field in fields]
+                cells = [number_texts(case.time), *_cells(case, columns)]
+                same = _line(begin)
+                rows = "".join(",".join((*same, *row)) + "\n" for row in zip(*cells, strict=True))
+                sink.write(memoryview(rows.encode("utf-8", "replace")))
+                sink.check()
+        return WrittenExport(sum(len(case.time) for case in cases))
 
 
 FORMAT = Csv()

@@ -18,9 +18,8 @@ from met.frozen import frozen
 if TYPE_CHECKING:
     from batch.archive.read import ArchiveFile
     from batch.campaigns.campaign import Campaign
-    from batch.export.case_table import CaseTable
-    from batch.export.evidence_rows import EvidenceColumns
     from batch.export.picking import ExportedCase
+    from batch.export.tables import CaseTable, EvidenceColumns
 
 Rows = Literal["metrics", "histories", "evidence"]
 """The rows of an export: a case with its metrics, an instant of a case, or a requirement at a design point."""

@@ -18,12 +18,11 @@ import numpy as np
 from batch.archive.read import ArchiveFile
 from batch.archive.sink import temporary_of
 from batch.campaigns.campaign import Campaign
-from batch.export.case_table import CaseTable, TableColumn, of_varied, value_of, varied
 from batch.export.csv import all_columns
-from batch.export.evidence_rows import EvidenceColumns
 from batch.export.formats import ExportFormat, ExportRequest, WrittenExport
 from batch.export.output import whole
 from batch.export.picking import ExportedCase, SignalColumn
+from batch.export.tables import CaseTable, EvidenceColumns, TableColumn, value_of, varied_columns
 from met.diagnostic import Problem, error
 from met.host.files import open_regular
 from met.version import VERSION
@@ -36,45 +35,6 @@ COMPRESSION = "snappy"
 
 GROUP_ROWS = 100_000
 """Approximate number of rows of a row group, which holds whole cases."""
-
-
-def write(file: ArchiveFile, cases: Sequence[ExportedCase], output: Path, *, deck: bool = False) -> int:
-    """Write the cases' histories and return the number of rows. deck: varied parameters in the deck's units. Raises
-    Problem E305, and E373 where there is no pyarrow."""
-    arrow, parquet = pyarrow_here()
-    columns, runs = all_columns(cases), dict.fromkeys(case.run_name for case in cases)
-    fields = [of_varied(variable, deck=deck) for variable in varied([case.group for case in _one_each(cases)])]
-    schema = _schema(arrow, cases, fields, columns).with_metadata(_about(file, runs))
-    with whole(output) as sink:
-        with parquet.ParquetWriter(str(temporary_of(output)), schema, compression=COMPRESSION) as writer:
-            waiting: list[Any] = []
-            for case in cases:
-                waiting.append(_table(arrow, schema, case, fields))
-                if sum(map(len, waiting)) >= GROUP_ROWS:
-                    writer.write_table(arrow.concat_tables(waiting))
-                    waiting = []
-            if waiting:
-                writer.write_table(arrow.concat_tables(waiting))
-        sink.check()
-    return sum(len(case.time) for case in cases)
-
-
-def write_rows(file: ArchiveFile, table: CaseTable | EvidenceColumns, output: Path) -> int:
-    """Write a table of cases, or of evidence, and return the number of its rows. Raises Problem E305, E373."""
-    arrow, parquet = pyarrow_here()
-    kinds = {"float": arrow.float64(), "int": arrow.int64(), "str": arrow.string()}
-    fields = [
-        arrow.field(field.name, kinds[field.kind], metadata=_metadata(field.unit, field.about))
-        for field in table.fields
-    ]
-    schema = arrow.schema(fields).with_metadata(_about(file, table.runs))
-    with whole(output) as sink:
-        with parquet.ParquetWriter(str(temporary_of(output)), schema, compression=COMPRESSION) as writer:
-            for columns in table.blocks():
-                arrays = [arrow.array(values, field.type) for values, field in zip(columns, schema, strict=True)]
-                writer.write_table(arrow.Table.from_arrays(arrays, schema=schema))
-        sink.check()
-    return table.count
 
 
 def _about(file: ArchiveFile, runs: Iterable[str]) -> dict[str, str]:
@@ -168,12 +128,42 @@ class Parquet(ExportFormat):
         pyarrow_here()
 
     def write_table(self, file: ArchiveFile, table: CaseTable | EvidenceColumns, target: Path) -> WrittenExport:
-        return WrittenExport(write_rows(file, table, target))
+        """Write a table of cases, or of evidence. Raises Problem E305, E373."""
+        arrow, parquet = pyarrow_here()
+        kinds = {"float": arrow.float64(), "int": arrow.int64(), "str": arrow.string()}
+        fields = [
+            arrow.field(field.name, kinds[field.kind], metadata=_metadata(field.unit, field.about))
+            for field in table.fields
+        ]
+        schema = arrow.schema(fields).with_metadata(_about(file, table.runs))
+        with whole(target) as sink:
+            with parquet.ParquetWriter(str(temporary_of(target)), schema, compression=COMPRESSION) as writer:
+                for columns in table.blocks():
+                    arrays = [arrow.array(values, field.type) for values, field in zip(columns, schema, strict=True)]
+                    writer.write_table(arrow.Table.from_arrays(arrays, schema=schema))
+            sink.check()
+        return WrittenExport(table.count)
 
     def write_histories(
         self, file: ArchiveFile, cases: Sequence[ExportedCase], target: Path, request: ExportRequest
     ) -> WrittenExport:
-        return WrittenExport(write(file, cases, target, deck=request.units == "deck"))
+        """Write the histories of these cases. Raises Problem E305, and E373 where there is no pyarrow."""
+        arrow, parquet = pyarrow_here()
+        columns, runs = all_columns(cases), dict.fromkeys(case.run_name for case in cases)
+        fields = varied_columns([case.group for case in _one_each(cases)], deck=request.units == "deck")
+        schema = _schema(arrow, cases, fields, columns).with_metadata(_about(file, runs))
+        with whole(target) as sink:
+            with parquet.ParquetWriter(str(temporary_of(target)), schema, compression=COMPRESSION) as writer:
+                waiting: list[Any] = []
+                for case in cases:
+                    waiting.append(_table(arrow, schema, case, fields))
+                    if sum(map(len, waiting)) >= GROUP_ROWS:
+                        writer.write_table(arrow.concat_tables(waiting))
+                        waiting = []
+                if waiting:
+                    writer.write_table(arrow.concat_tables(waiting))
+            sink.check()
+        return WrittenExport(sum(len(case.time) for case in cases))
 
 
 FORMAT = Parquet()

@@ -16,8 +16,8 @@ import batch
 from batch.archive.read import ArchiveFile
 from batch.export import Exported, export, summary
 from batch.export import parquet as module
-from batch.export.case_table import TableColumn
 from batch.export.csv import _column
+from batch.export.tables import TableColumn
 from met import run as engine
 from met.diagnostic import Problem
 from met.unit_parser import parse_unit

@@ -1,5 +1,5 @@
-"""A table of cases for `csv` and `parquet`: a row for each case, with its varied values, its end, its metrics, and
-whether it meets each requirement."""
+"""Tables for `csv` and `parquet`: of cases, a row for each with its varied values, its end, its metrics, and whether it
+meets each requirement; and of evidence, a row for each requirement at a design point."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from batch.archive.read import ArchiveFile, ArchiveGroup
 from batch.archive.stored import Stored
 from batch.export.picking import rank
 from batch.queries import requirements
+from batch.queries.evidence_table import RequirementEvidence, requirement_evidence
 from batch.queries.pool import STATUS, by_run, cases_named, groups_named
 from met.frozen import frozen
 from met.unit_parser import decimals
@@ -107,8 +108,7 @@ def _fields(groups: Sequence[ArchiveGroup], *, deck: bool) -> Iterator[TableColu
         yield TableColumn("run", "", "run or sweep", "str")
     yield TableColumn("case", "1", "position in the case table", "int", "case")
     yield TableColumn("case_id", "", "name of the case", "str", "case_id")
-    for variable in varied(groups):
-        yield of_varied(variable, deck=deck)
+    yield from varied_columns(groups, deck=deck)
     if any("repeat" in group.variables and group.values("repeat").any() for group in groups):
         yield TableColumn("repeat", "1", "repeat of noise", "int", "repeat")
     yield TableColumn("status", "", "how it ended", "str", "status")
@@ -124,12 +124,14 @@ def _fields(groups: Sequence[ArchiveGroup], *, deck: bool) -> Iterator[TableColu
         yield TableColumn("cause", "", "why it failed", "str", "cause")
 
 
-def varied(groups: Sequence[ArchiveGroup]) -> list[Stored]:
-    """Variables that are varied in any of the groups: choices of structure, then numbers."""
-    return list({v.name: v for role in ("choice", "coordinate") for group in groups for v in group.role(role)}.values())
+def varied_columns(groups: Sequence[ArchiveGroup], *, deck: bool) -> list[TableColumn]:
+    """The columns of what is varied in any of the groups: choices of structure, then numbers. deck: numbers in the
+    deck's units"""
+    variables = {v.name: v for role in ("choice", "coordinate") for group in groups for v in group.role(role)}
+    return [_of_varied(variable, deck=deck) for variable in variables.values()]
 
 
-def of_varied(variable: Stored, *, deck: bool) -> TableColumn:
+def _of_varied(variable: Stored, *, deck: bool) -> TableColumn:
     """The column of a varied quantity: a deck may vary a `let run`."""
     name = f"coordinates.{variable.name}" if variable.name == "run" else variable.name
     if variable.role == "choice":
@@ -176,3 +178,79 @@ def _outcomes(group: ArchiveGroup, text: str, positions: np.ndarray) -> list[obj
         return [None] * len(positions)
     outcomes = requirements.outcomes(group, positions)[:, texts.index(text)]
     return [OUTCOME.get(int(value)) for value in outcomes]
+
+
+# Evidence
+
+
+@frozen
+class EvidenceColumns:
+    """The evidence for the requirements of runs and sweeps. deck: numbers in the deck's units, else SI; each
+    row names its own"""
+
+    runs: tuple[str, ...]
+    rows: tuple[RequirementEvidence, ...]
+    fields: tuple[TableColumn, ...]
+    deck: bool
+
+    @property
+    def count(self) -> int:
+        return len(self.rows)
+
+    def blocks(self) -> Iterator[list[list[object]]]:
+        """All rows at once: the values of each field, None where a cell is empty."""
+        yield [[self._cell(field, row) for row in self.rows] for field in self.fields]
+
+    def _cell(self, field: TableColumn, row: RequirementEvidence) -> object:
+        """A cell of the table of evidence, in the deck's unit or SI; None for an empty one."""
+        value = getattr(row, field.name)
+        if field.name == "unit":
+            return row.unit if self.deck else row.si_unit
+        if field.name in IN_UNIT and value is not None and self.deck:
+            return NumberOfUnit(decimals([value], row.unit)[0]) if row.scale != 1.0 else float(value)
+        return None if value == "" else value
+
+
+IN_UNIT = ("limit", "percentile_bound", "worst", "margin", "step_error")
+"""Columns whose numbers are in the unit of the row."""
+
+COLUMNS: tuple[tuple[str, str, str], ...] = (
+    ("run", "str", "run or sweep"),
+    ("requirement", "str", "as the deck wrote it"),
+    ("at", "str", "design point: what was chosen"),
+    ("metric", "str", "of which it is"),
+    ("unit", "str", "of limit, percentile_bound, worst, margin and step_error"),
+    ("comparison", "str", "of the metric with the limit"),
+    ("limit", "float", "that is required"),
+    ("share", "float", "of cases that is to meet it; empty where every case is"),
+    ("confidence", "float", "with which the share is to be shown"),
+    ("verdict", "str", "what follows"),
+    ("cases", "int", "that were judged"),
+    ("missed", "int", "cases that miss it, failed, or have no value"),
+    ("share_met", "float", "of the cases that were run"),
+    ("at_least", "float", "share of all cases that meet it, lower bound"),
+    ("at_most", "float", "share of all cases that meet it, upper bound"),
+    ("percentile_bound", "float", "of the percentile, on the side of the limit"),
+    ("worst", "float", "value nearest to the limit or furthest beyond it"),
+    ("worst_case", "int", "position of that case in the case table"),
+    ("margin", "float", "from the worst value to the limit"),
+    ("sigmas", "float", "from the mean to the limit, in standard deviations over the drawn cases"),
+    ("step_error", "float", "of the metric by the step, largest of the verified cases"),
+    ("more_cases", "int", "that would demonstrate it if none of them misses it"),
+    ("test", "str", "of verdict and bounds: fixed, or sequential, looked at after every case"),
+    ("decided", "int", "cases after which a sequential test decided it"),
+    ("why", "str", "it was not judged as it asks for"),
+    ("again", "str", "command that runs the worst case"),
+)
+"""Fields of `RequirementEvidence` in the order of a table: name, kind, about."""
+
+
+def evidence_columns(file: ArchiveFile, runs: Sequence[str], *, deck: bool = False) -> EvidenceColumns:
+    """The table of evidence (what the cases show of each requirement) of these runs and sweeps, of all if none is
+    named. Raises Problem E325."""
+    groups = groups_named(file, tuple(runs))
+    rows = requirement_evidence(groups, file.path.name, several=len(by_run(file.groups)) > 1)
+    fields = tuple(
+        TableColumn(name, "" if kind == "str" or name in IN_UNIT else "1", about, kind) for name, kind, about in COLUMNS
+    )
+    return EvidenceColumns(tuple(by_run(groups)), tuple(rows), fields, deck)
