@@ -54,7 +54,7 @@ class ArchiveGroup:
             self.step_errors = tuple(verified.read_limits(self))
             self.summary = summarised.read(node, self)
         self.summed: summarised.CaseSummary | None = None
-        """The summary of all cases, once computed from their rows (batch/queries/streamed.py)."""
+        """The summary of all cases, once computed from their rows (batch/queries/tallies.py)."""
         self.name: str = self.attributes["experiment"]
         self.sweep: str = str(self.attributes.get("sweep", ""))
 

@@ -90,9 +90,10 @@ def best(
     from batch.archive.searched import search_of
     from batch.campaigns.judging import judged_best
     from batch.queries.best import Designs
-    from batch.queries.best_answer import BestAnswer, context
+    from batch.queries.best_answer import BestAnswer
+    from batch.queries.given import context
     from batch.queries.pool import groups_named, pools
-    from batch.queries.search_result import search_result
+    from batch.queries.search_answers import search_result
     from batch.queries.summary import finite
     from batch.terminal.chosen_deck import chosen_deck
     from met.diagnostic import Problem, error

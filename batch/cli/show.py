@@ -58,8 +58,7 @@ def show(
     import shutil
 
     from batch.archive.read import ArchiveFile
-    from batch.queries.ordering import by_names
-    from batch.queries.selection import CaseSelection
+    from batch.queries.ordering import CaseSelection, by_names
     from batch.terminal.show import as_json, show, show_evidence
 
     if reverse and not sort:

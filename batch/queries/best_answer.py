@@ -9,10 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from batch.archive.read import ArchiveFile
 from batch.archive.stored import Stored
 from batch.queries.best import ENDS, Designs, Goal, Stretch
-from batch.queries.pool import CaseColumn, Pool, failure_lines
+from batch.queries.pool import CaseColumn, failure_lines
 from batch.queries.signals import number_text, number_texts, pretty_unit
 from batch.queries.stability_words import KEPT, margin_words, stability_data, stability_texts, wrapped
 from batch.queries.summary import finite
@@ -20,7 +19,7 @@ from ic.driver.write_values import WrittenValue
 from ic.printing.columns import columns, count
 from met.diagnostic import Problem, error
 from met.frozen import frozen
-from met.outputs import quoted, setting_option, setting_path, varied_run, varies
+from met.outputs import quoted, setting_option, setting_path
 from met.plan.searches import JudgedDesign
 from met.unit_parser import written
 from met.units import text as unit_text
@@ -445,22 +444,3 @@ def _beyond(why: str) -> str:
 
 def _wrapped(text: str, width: int) -> list[str]:
     return textwrap.wrap(text, max(40, width), initial_indent="  ", subsequent_indent="  ", break_on_hyphens=False)
-
-
-def context(archive: ArchiveFile, pool: Pool) -> dict[str, Any]:
-    """The arguments of `BestAnswer` that describe a campaign: deck, name, seed, options, and remarks."""
-    defines = str(archive.provenance.get("defines") or "").split()
-    remarks = []
-    if any(group.attributes.get("step_errors") for group in pool.groups):
-        remarks.append("requirements on errors by the step are not looked at here: `met show --evidence`")
-    settings: tuple[str, ...] = ()
-    try:
-        settings = archive.plan(as_written=True).settings
-    except Problem:  # for instance, a model of the plan is not installed here
-        remarks.append("the plan in this archive cannot be read: what `--set` set, if it did, is not in the command")
-    seed = int(pool.groups[0].at("seed", [0])[0])
-    name = varied_run(pool.name) if any(map(varies, settings)) else pool.name
-    return {
-        "deck": archive.deck.strip("<>"), "name": name, "seed": seed, "defines": defines, "overrides": settings,
-        "remarks": remarks,
-    }  # fmt: skip

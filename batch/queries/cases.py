@@ -13,8 +13,8 @@ from batch.queries import ordering, requirements
 from batch.queries.ordering import CaseOrder
 from batch.queries.pool import ENDED, STATUS, Pool
 from batch.queries.signals import deck_unit, number_text, number_texts, value_text
-from batch.queries.streamed import is_streamed, summed_up
 from batch.queries.summary import finite
+from batch.queries.tallies import is_streamed, summed_up
 from met.diagnostic import Problem
 from met.distinct import distinct
 

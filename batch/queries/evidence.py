@@ -22,7 +22,7 @@ from batch.queries import requirements
 from batch.queries.requirements import GroupRequirement
 from batch.queries.search_answers import SearchAnswer
 from batch.queries.signals import deck_unit, pretty_unit
-from batch.queries.streamed import summed_up
+from batch.queries.tallies import summed_up
 from met.frozen import frozen
 from met.statistics import confidence as fixed
 from met.statistics import sequential

@@ -17,7 +17,7 @@ from batch.queries.evidence import EvidenceRow, Verdict, evidence_for, percent_a
 from batch.queries.requirements import group_requirements
 from batch.queries.signals import deck_unit, number_text, pretty_unit
 from batch.queries.step_errors.figures import StepErrorVerdict, figures, rounded, verdicts
-from batch.queries.streamed import summed_up
+from batch.queries.tallies import summed_up
 from met.frozen import frozen
 from met.outputs import quoted
 

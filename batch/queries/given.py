@@ -1,10 +1,14 @@
-"""What the command line of a run gave its deck: `--set`, `--vary` and `-D`."""
+"""What a run was given: the settings of its command line, `--set`, `--vary` and `-D`, with its deck, name and seed."""
 
 from __future__ import annotations
 
+from typing import Any
+
 from batch.archive.read import ArchiveFile
+from batch.queries.pool import Pool
 from ic.text.lexer import COMMAND_LINE
-from met.outputs import setting_path, varies
+from met.diagnostic import Problem
+from met.outputs import setting_path, varied_run, varies
 
 
 def settings_lines(archive: ArchiveFile) -> list[str]:
@@ -32,3 +36,22 @@ def _settings(lines: list[str], defines: str) -> list[str]:
 
 def _spaced(setting: str) -> str:
     return f"{setting_path(setting)} = {setting.partition('=')[2].strip()}"
+
+
+def context(archive: ArchiveFile, pool: Pool) -> dict[str, Any]:
+    """The deck, name, seed, options and remarks of a campaign, by those arguments of `BestAnswer` in best_answer.py."""
+    defines = str(archive.provenance.get("defines") or "").split()
+    remarks = []
+    if any(group.attributes.get("step_errors") for group in pool.groups):
+        remarks.append("requirements on errors by the step are not looked at here: `met show --evidence`")
+    settings: tuple[str, ...] = ()
+    try:
+        settings = archive.plan(as_written=True).settings
+    except Problem:  # for instance, a model of the plan is not installed here
+        remarks.append("the plan in this archive cannot be read: what `--set` set, if it did, is not in the command")
+    seed = int(pool.groups[0].at("seed", [0])[0])
+    name = varied_run(pool.name) if any(map(varies, settings)) else pool.name
+    return {
+        "deck": archive.deck.strip("<>"), "name": name, "seed": seed, "defines": defines, "overrides": settings,
+        "remarks": remarks,
+    }  # fmt: skip

@@ -20,7 +20,7 @@ from batch.queries.search_answers import SearchAnswer
 from batch.queries.signals import number_text
 from batch.queries.step_errors import figures
 from batch.queries.step_errors.figures import StepErrorVerdict, Verification, verdicts
-from batch.queries.streamed import summed_up
+from batch.queries.tallies import summed_up
 from batch.queries.warnings import warnings
 from met.diagnostic import Diagnostic
 from met.frozen import frozen

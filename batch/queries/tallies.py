@@ -1,8 +1,9 @@
 """Statistics of very many cases, block by block: counts, moments, extremes and order statistics, for archives that keep
 a summary, and for those with more rows than fit in memory.
 
-Blocks are of one size and come in order, and sums are exact: so results do not depend on how the cases were run. Memory
-grows with the design points, and with the cases beyond a bounded percentile.
+`CaseTallies` adds the blocks up; `summed_up` gives the summary of an archive's group, made from its rows where it keeps
+none. Blocks are of one size and come in order, and sums are exact: so results do not depend on how the cases were run.
+Memory grows with the design points, and with the cases beyond a bounded percentile.
 """
 
 from __future__ import annotations
@@ -14,10 +15,13 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from batch.archive.summarised import DOUBTFUL, VARIABLES, WORDS
+from batch.archive.read import ArchiveGroup
+from batch.archive.stored import Stored
+from batch.archive.summarised import DOUBTFUL, VARIABLES, WORDS, CaseSummary
 from batch.queries.pool import NUMBER
-from batch.queries.requirements import beyond
+from batch.queries.requirements import beyond, group_requirements, requirement_texts
 from met.frozen import frozen
+from met.plan.columns import blocks
 from met.run import DONE
 from met.statistics.confidence import percentile_rank
 from met.statistics.moments import Furthest, Moments
@@ -256,3 +260,87 @@ def _most(requirement: RequiredOfCases, cases: int) -> int:
         return 0
     rank = percentile_rank(cases, requirement.share, requirement.confidence)
     return cases - rank + 1 if rank else 0
+
+
+# An archive's rows
+
+MANY = 4_000_000
+"""Number of rows of a run or sweep from which they are processed in blocks: with fewer, medians and an order of all are
+worth half a gigabyte of memory."""
+
+STREAMED = "streamed"
+"""The word of a summary that is not stored in an archive."""
+
+
+def is_streamed(group: ArchiveGroup) -> bool:
+    """True where a group has a row for each case, and too many for memory."""
+    return group.summary is None and group.count > MANY and not group.attributes.get("until_shown")
+
+
+def summed_up(group: ArchiveGroup) -> CaseSummary | None:
+    """The summary of all cases; None where their rows fit in memory, or counts alone do not suffice: for cases that
+    stop by their results, and with very many design points."""
+    if group.summary is None and group.summed is None and is_streamed(group):
+        group.summed = _of_rows(group)
+    return group.summary or group.summed
+
+
+def _of_rows(group: ArchiveGroup) -> CaseSummary | None:
+    """The summary of a group's rows, read in blocks; None for an older archive, or too many design points."""
+    required = group_requirements(group)
+    if len(required) < len(requirement_texts(group)):  # an older archive, which lacks parts of some
+        return None
+    coordinates = group.role("coordinate")
+    stretches = blocks(group.count) if "repeat" in group.variables else ()
+    repeats = any(group.stretch("repeat", piece.start, piece.stop).any() for piece in stretches)
+    drawn = any(variable.attributes.get("design") for variable in coordinates) or repeats
+    chosen = [coordinate for coordinate in coordinates if not coordinate.attributes.get("design")] if drawn else []
+    try:
+        sizes = _sizes(group, chosen)
+        points = PointNumbers()
+        tallies = CaseTallies([variable.name for variable in group.role("metric")], required, sizes)
+        for piece in blocks(group.count):
+            tallies.add(_block(group, piece, chosen, points))
+    except TooManyPoints:
+        return None
+    values = tallies.values(
+        lambda place: int(group.at("case", [place])[0]),
+        {name: name for name in tallies.metrics},
+        [variable.name for variable in chosen],
+        points,
+    )
+    return CaseSummary(group.count, tallies.limited, STREAMED, drawn, values)
+
+
+def _sizes(group: ArchiveGroup, chosen: list[Stored]) -> list[int]:
+    """The number of cases of each design point."""
+    if not chosen:
+        return [group.count]
+    points, sizes = PointNumbers(), np.zeros(MOST_POINTS, np.int64)
+    for piece in blocks(group.count):
+        sizes += np.bincount(_points(group, piece, chosen, points), minlength=len(sizes))
+    return sizes[: len(points.values)].tolist()
+
+
+def _points(group: ArchiveGroup, piece: slice, chosen: list[Stored], points: PointNumbers) -> np.ndarray:
+    stretches = [group.stretch(variable.name, piece.start, piece.stop) for variable in chosen]
+    return points.of(stretches, piece.stop - piece.start)
+
+
+def _block(group: ArchiveGroup, piece: slice, chosen: list[Stored], points: PointNumbers) -> CaseBlock:
+    """The outcomes and metrics of a stretch of a group's rows, with the design point of each."""
+
+    def read(name: str) -> np.ndarray:
+        return group.stretch(name, piece.start, piece.stop)
+
+    count = piece.stop - piece.start
+    return CaseBlock(
+        np.arange(piece.start, piece.stop),
+        read("status"),
+        read("cause").tolist(),
+        read("warning").tolist() if "warning" in group.variables else [""] * count,
+        {variable.name: read(variable.name) for variable in group.role("metric")},
+        read("met") if "met" in group.variables else np.zeros((count, 0), np.int8),
+        _points(group, piece, chosen, points),
+        int(np.count_nonzero(read("bed_limited"))) if "bed_limited" in group.variables else 0,
+    )

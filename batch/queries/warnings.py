@@ -15,7 +15,7 @@ from batch.queries import at_limits
 from batch.queries.requirements import GroupRequirement, group_requirements
 from batch.queries.signals import number_text
 from batch.queries.step_errors import warning as step_errors
-from batch.queries.streamed import summed_up
+from batch.queries.tallies import summed_up
 from ic.meaning.checks.reach import flies_from_afar
 from ic.printing.columns import count as counted
 from met import models

@@ -22,9 +22,9 @@ from batch.executors.threads import Threads
 from batch.export import Exported
 from batch.export.from_run import archive_and_export, check, export_command, export_run
 from batch.queries.ordering import structures
-from batch.queries.search_result import search_result
-from batch.queries.streamed import MANY
+from batch.queries.search_answers import search_result
 from batch.queries.summary import RequirementSummary, Summary, summarise
+from batch.queries.tallies import MANY
 from batch.queries.warnings import campaign_warnings
 from batch.terminal.progress import Bar
 from batch.terminal.verdict import (

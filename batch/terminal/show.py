@@ -16,14 +16,11 @@ from batch.queries.at_limits import reached_texts
 from batch.queries.evidence_table import RequirementEvidence, requirement_evidence
 from batch.queries.evidence_table import as_data as evidence_data
 from batch.queries.given import settings_lines
-from batch.queries.ordering import CaseOrder, structures
+from batch.queries.ordering import CaseOrder, CaseSelection, structures
 from batch.queries.pool import Pool, by_run, cases_named, failure_lines, groups_named, pools
-from batch.queries.search_answers import SearchAnswer
-from batch.queries.search_result import search_result
-from batch.queries.selection import CaseSelection
+from batch.queries.search_answers import SearchAnswer, search_result
 from batch.queries.signals import DeckUnits, case_text, history, number_text, number_texts, panels, pretty_unit
 from batch.queries.step_errors.figures import NONE, about, error_text
-from batch.queries.streamed import is_streamed
 from batch.queries.summary import (
     SPREAD_COLUMNS,
     SUMMED_COLUMNS,
@@ -34,6 +31,7 @@ from batch.queries.summary import (
     SummedMetric,
     summary_of,
 )
+from batch.queries.tallies import is_streamed
 from batch.terminal.evidence import evidence_lines, evidence_table_lines
 from ic.printing.columns import columns, count
 from ic.printing.columns import size as size_text

@@ -13,7 +13,7 @@ from batch.campaigns.campaign import Campaign, CampaignPart
 from batch.campaigns.performing import Performed
 from batch.campaigns.status import duration
 from batch.queries.pool import failure_lines
-from batch.queries.search_result import SearchResult
+from batch.queries.search_answers import SearchResult
 from batch.queries.step_errors.figures import HINT
 from batch.queries.summary import Summary, as_json, finite
 from batch.terminal.show import MOST_GROUPS, verdict, warning_lines

@@ -7,10 +7,10 @@ import numpy as np
 from batch.archive.read import ArchiveFile, ArchiveGroup
 from batch.campaigns.judging import judged_best
 from batch.queries.best import DesignAxis, Designs
-from batch.queries.best_answer import BestAnswer, context
+from batch.queries.best_answer import BestAnswer
+from batch.queries.given import context
 from batch.queries.pool import Pool
-from batch.queries.search_answers import SearchAnswer
-from batch.queries.search_result import search_result
+from batch.queries.search_answers import SearchAnswer, search_result
 from batch.queries.signals import deck_unit, number_text
 from batch.queries.stability_words import unwrapped
 from batch.report.contents.parts import DesignAnswer, DesignMap, TextTable

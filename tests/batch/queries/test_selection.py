@@ -12,8 +12,8 @@ import pytest
 import batch
 from batch.archive.read import ArchiveFile
 from batch.queries.expressions import CaseExpressions
+from batch.queries.ordering import CaseSelection
 from batch.queries.pool import Pool
-from batch.queries.selection import CaseSelection
 from batch.terminal.show import as_json, show
 from met.cli import main
 from met.diagnostic import Problem

@@ -11,7 +11,7 @@ import pytest
 import batch
 import ic
 from batch.archive.read import ArchiveFile, ArchiveGroup
-from batch.queries import streamed, tallies
+from batch.queries import tallies
 from batch.queries.evidence_table import requirement_evidence
 from batch.queries.summary import SummedMetric, summarise
 from batch.terminal.show import show, show_evidence
@@ -115,14 +115,14 @@ def test_tallies_of_blocks_of_any_size_are_those_of_all_cases(
 
 @pytest.fixture
 def many(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(streamed, "MANY", 100)
+    monkeypatch.setattr(tallies, "MANY", 100)
 
 
 @pytest.mark.release
 def test_evidence_is_that_of_rows_that_are_held(archive: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     with ArchiveFile(archive) as file:
         held = requirement_evidence(file.groups, "d.h5")
-    monkeypatch.setattr(streamed, "MANY", 100)
+    monkeypatch.setattr(tallies, "MANY", 100)
     with ArchiveFile(archive) as file:
         found = requirement_evidence(file.groups, "d.h5")
         assert file.groups[0].summed is not None and file.groups[0].summary is None
@@ -137,7 +137,7 @@ def test_evidence_is_that_of_rows_that_are_held(archive: Path, monkeypatch: pyte
 def test_the_outcome_is_that_of_rows_that_are_held(archive: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     with ArchiveFile(archive) as file:
         (held,) = summarise(file)
-    monkeypatch.setattr(streamed, "MANY", 100)
+    monkeypatch.setattr(tallies, "MANY", 100)
     with ArchiveFile(archive) as file:
         (found,) = summarise(file)
     assert (held.cases, held.failed, held.ok, held.limits) == (found.cases, found.failed, found.ok, found.limits)
@@ -195,7 +195,6 @@ def test_all_cases_are_listed_where_they_are_asked_for(archive: Path, many: None
 
 def test_too_many_design_points_are_held(archive: Path, many: None, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(tallies, "MOST_POINTS", 3)
-    monkeypatch.setattr(streamed, "MOST_POINTS", 3)
     with ArchiveFile(archive) as file:
-        assert streamed.summed_up(file.groups[0]) is None
+        assert tallies.summed_up(file.groups[0]) is None
         assert "180 of 360 cases reached their end" in show(file)
