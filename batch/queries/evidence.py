@@ -106,20 +106,23 @@ def evidence_for(group: ArchiveGroup, judged_requirements: Sequence[GroupRequire
     one where every case has to meet it."""
     if not judged_requirements:
         return []
+    everything = [DesignPoint({}, np.arange(group.count))]
     if (answer := SearchAnswer.of(group)) is not None:
-        return _of_answer(answer)
-    if is_search(group):  # a part of its cases: an optimiser chose them, so that each is judged by every requirement
-        judged_requirements = [replace(requirement, share=None, confidence=None) for requirement in judged_requirements]
-    if (summed := summed_up(group)) is not None:
-        return list(_of_summary(group, summed, judged_requirements))
+        judged_requirements, why = answer.required, SEARCHED
+        points = everything = [DesignPoint({}, np.array(answer.best.cases))]
+    else:
+        if is_search(group):  # a part of its cases: an optimiser chose them, so that every requirement judges each
+            judged_requirements = [replace(required, share=None, confidence=None) for required in judged_requirements]
+        if (summed := summed_up(group)) is not None:
+            return list(_of_summary(group, summed, judged_requirements))
+        points, why = _design_points(group)
     outcomes = requirements.outcomes(group)
-    points, why = _design_points(group)
     early = bool(group.attributes.get("until_shown"))
     out = []
     for judged_requirement in judged_requirements:
         values = group.values(judged_requirement.metric)
         scale, unit = deck_unit(group.variables[judged_requirement.metric])
-        for point in points if judged_requirement.share is not None else [DesignPoint({}, np.arange(group.count))]:
+        for point in points if judged_requirement.share is not None else everything:
             judged = _judged(
                 judged_requirement, values[point.cases], outcomes[point.cases, judged_requirement.place], why, early
             )
@@ -132,20 +135,6 @@ def evidence_for(group: ArchiveGroup, judged_requirements: Sequence[GroupRequire
     return out
 
 
-def _of_answer(answer: SearchAnswer) -> list[EvidenceRow]:
-    """The rows of the requirements in the cases of a search's answer, each asked of every one of these."""
-    group, cases = answer.group, np.array(answer.best.cases)
-    met, out = requirements.outcomes(group), []
-    for requirement in answer.required:
-        judged = _judged(
-            requirement, group.values(requirement.metric)[cases], met[cases, requirement.place], SEARCHED, early=False
-        )
-        scale, unit = deck_unit(group.variables[requirement.metric])
-        worst = int(cases[judged.pop("worst")])
-        out.append(EvidenceRow(requirement=requirement, unit=unit, scale=scale, chosen={}, worst=worst, **judged))
-    return out
-
-
 def _of_summary(
     group: ArchiveGroup, summary: CaseSummary, judged_requirements: Sequence[GroupRequirement]
 ) -> Iterator[EvidenceRow]:
@@ -154,7 +143,6 @@ def _of_summary(
     why = _why_without_confidence(group, group.role("coordinate"))
     for requirement in judged_requirements:
         scale, unit = deck_unit(group.variables[requirement.metric])
-        sign = 1.0 if requirement.comparison.startswith("<") else -1.0
         for row in summary.judged(requirement.place, whole=requirement.share is None):
             values = summary.values["chosen_value"][row["point"]] if row["point"] >= 0 else ()
             misses, spread = row["missed"] + row["unknown"], row["deviation"]
@@ -162,8 +150,8 @@ def _of_summary(
                 "cases": row["cases"],
                 "missed": misses,
                 "value": row["worst"],
-                "margin": sign * (requirement.limit - row["worst"]),
-                "sigmas": sign * (requirement.limit - row["mean"]) / spread if spread > 0.0 else None,
+                "margin": requirement.margin(row["worst"]),
+                "sigmas": requirement.margin(row["mean"]) / spread if spread > 0.0 else None,
             }
             if _without_confidence(requirement, why):
                 verdict_fields |= _counted(requirement, row["cases"], misses, why)
@@ -243,7 +231,6 @@ def _judged(
     worst = int(
         np.where(unknown, np.inf, requirements.beyond(values, requirement.comparison, requirement.limit)).argmax()
     )
-    sign = 1.0 if requirement.comparison.startswith("<") else -1.0
     finite = values[np.isfinite(values)]
     deviation = float(finite.std(ddof=1)) if len(finite) > 1 else 0.0
     fields: dict[str, Any] = {
@@ -251,8 +238,8 @@ def _judged(
         "missed": missed,
         "worst": worst,
         "value": float(values[worst]),
-        "margin": sign * (requirement.limit - float(values[worst])),
-        "sigmas": sign * (requirement.limit - float(finite.mean())) / deviation if deviation > 0.0 else None,
+        "margin": requirement.margin(float(values[worst])),
+        "sigmas": requirement.margin(float(finite.mean())) / deviation if deviation > 0.0 else None,
     }
     if _without_confidence(requirement, why):
         return {**fields, **_counted(requirement, cases, missed, why)}
@@ -316,7 +303,7 @@ def _judged_early(
         )
         for cases, _ in looks
     ]
-    tightest = min if requirement.comparison.startswith("<") else max
+    tightest = min if requirement.below else max
     open_yet = verdict == "not shown"
     return {
         "lower": max(sequential.lower_bound(*look, confidence) for look in looks),
@@ -334,9 +321,8 @@ def _order_statistic(requirement: GroupRequirement, values: np.ndarray, unknown:
     cases, or it falls among those without a value."""
     if not rank:
         return None
-    below = requirement.comparison.startswith("<")
-    known = np.where(unknown, np.inf if below else -np.inf, values)
-    statistic = float(np.sort(known)[rank - 1 if below else len(values) - rank])
+    known = np.where(unknown, np.inf if requirement.below else -np.inf, values)
+    statistic = float(np.sort(known)[rank - 1 if requirement.below else len(values) - rank])
     return statistic if np.isfinite(statistic) else None
 
 

@@ -26,6 +26,15 @@ class GroupRequirement:
     share: float | None = None
     confidence: float | None = None
 
+    @property
+    def below(self) -> bool:
+        """True if values are to be below the limit."""
+        return self.comparison.startswith("<")
+
+    def margin(self, value: float) -> float:
+        """The distance from a value of the metric to the limit, SI; negative where the value is beyond it."""
+        return (1.0 if self.below else -1.0) * (self.limit - value)
+
 
 def requirement_texts(group: ArchiveGroup) -> list[str]:
     """The requirements as the deck wrote them."""
