@@ -8,6 +8,7 @@ it once and exits with 2. Nothing else is an acceptable way to refuse input.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from dataclasses import replace
 
 from met.messages.message import (
     Diagnostic,
@@ -39,6 +40,7 @@ __all__ = [
     "leave_out",
     "meant",
     "nearest",
+    "warning",
     "write",
     "write_either",
 ]
@@ -84,3 +86,10 @@ def error(
     label = Label(at) if isinstance(at, Place) else at
     helps = (help,) if isinstance(help, str) else tuple(help)
     return Diagnostic(code, message, label, tuple(also), helps)
+
+
+def warning(
+    code: str, message: str, at: Label | Place | None, *, also: Iterable[Label] = (), help: Iterable[str]
+) -> Diagnostic:
+    """A `Diagnostic` of severity warning, with the arguments of `error`."""
+    return replace(error(code, message, at, also=also, help=help), severity="warning")

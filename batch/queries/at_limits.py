@@ -8,7 +8,7 @@ import numpy as np
 
 from batch.queries.requirements import beyond, group_requirements
 from batch.queries.signals import deck_unit, number_text
-from met.diagnostic import Diagnostic, Label, Place
+from met.diagnostic import Diagnostic, Label, Place, warning
 from met.frozen import frozen
 from met.plan.columns import blocks
 
@@ -99,9 +99,9 @@ def _judged_at_a_limit(group: ArchiveGroup, experiment: Experiment | None) -> Di
         others = ", ".join(f"`require {other.text}`" for other, _, _ in judged if other is not required)
         helps.append(f"the same of {others}")
     place = None if experiment is None else experiment.requirements[required.place].place
-    set_at = _place(experiment, path)
+    set_at = place_of_parameter(experiment, path)
     also = () if set_at is None else (Label(set_at, "the limit"),)
-    return Diagnostic("D344", message, None if place is None else Label(place), also, tuple(helps), "warning")
+    return warning("D344", message, place, also=also, help=helps)
 
 
 def _passed(group: ArchiveGroup, experiment: Experiment | None) -> Diagnostic | None:
@@ -133,12 +133,11 @@ def _passed(group: ArchiveGroup, experiment: Experiment | None) -> Diagnostic | 
     if len(passed) > 1:
         others = ", ".join(f"`{_described(other)}`" for _, other, _ in passed if other is not variable)
         helps.append(f"also passed: {others}")
-    place = _place(experiment, path)
-    return Diagnostic("D345", message, None if place is None else Label(place), (), tuple(helps), "warning")
+    return warning("D345", message, place_of_parameter(experiment, path), help=helps)
 
 
-def _place(experiment: Experiment | None, path: str) -> Place | None:
-    """The place of a limit in the deck."""
+def place_of_parameter(experiment: Experiment | None, path: str) -> Place | None:
+    """The place in the deck of the parameter with this path; None where it is not known."""
     parameter = None if experiment is None else experiment.parameters.get(path)
     return None if parameter is None else parameter.origin.place
 

@@ -19,7 +19,7 @@ from batch.queries.tallies import summed_up
 from ic.meaning.checks.reach import flies_from_afar
 from ic.printing.columns import count as counted
 from met import models
-from met.diagnostic import Diagnostic, Label, Problem
+from met.diagnostic import Diagnostic, Problem, warning
 from met.plan.outputs import GRAPPLE_FIGURES
 from met.run import DONE
 
@@ -77,13 +77,12 @@ def grapple_warnings(group: ArchiveGroup, experiment: Experiment | None = None) 
     many = f", in {cases:,} of {group.count:,} cases, worst in #{group.values('case')[row]}"
     if len(bad) > 1:
         helps.append(f"also grappled so: {', '.join(f'`{other}`' for other in bad if other != payload)}")
-    grapple = None if experiment is None else experiment.parameters.get(f"payloads.{payload}.grapple")
-    place = None if grapple is None else grapple.origin.place
     message = (
         f"payload `{payload}` is grappled {', '.join(how)}{many if group.count > 1 else ''}: momentum is kept, and "
         f"{number_text(energy)} J are lost at once"
     )
-    return [Diagnostic("D347", message, None if place is None else Label(place), (), tuple(helps), "warning")]
+    place = at_limits.place_of_parameter(experiment, f"payloads.{payload}.grapple")
+    return [warning("D347", message, place, help=helps)]
 
 
 def undecided_warnings(group: ArchiveGroup, experiment: Experiment | None = None) -> list[Diagnostic]:
@@ -150,7 +149,7 @@ def _diagnostics(
     if others:
         helps.append(f"the same of {', '.join(f'`require {other.text}`' for other in others)}")
     place = None if experiment is None else experiment.requirements[first.place].place
-    return [Diagnostic("D341", message, None if place is None else Label(place), (), tuple(helps), "warning")]
+    return [warning("D341", message, place, help=helps)]
 
 
 def _is_time(model: str) -> bool:
@@ -192,8 +191,7 @@ def idle_warnings(group: ArchiveGroup, experiment: Experiment | None = None) -> 
     places = (
         {} if experiment is None else {coordinate.path: coordinate.place for coordinate in experiment.cases.coordinates}
     )
-    place = places.get(first)
-    return [Diagnostic("D329", message, None if place is None else Label(place), (), tuple(helps), "warning")]
+    return [warning("D329", message, places.get(first), help=helps)]
 
 
 def _idle(axes: dict[str, np.ndarray], metrics: list[np.ndarray]) -> list[str]:
@@ -240,10 +238,10 @@ def campaign_warnings(groups: Iterable[ArchiveGroup], experiments: Mapping[str, 
     first: dict[object, Diagnostic] = {}
     more: dict[object, int] = {}
     for group in groups:
-        for warning in warnings(group, experiments.get(group.name)):
-            key = (warning.code, warning.at if warning.at is not None else warning.message)
+        for diagnostic in warnings(group, experiments.get(group.name)):
+            key = (diagnostic.code, diagnostic.at if diagnostic.at is not None else diagnostic.message)
             more[key] = more.get(key, -1) + 1
-            first.setdefault(key, warning)
+            first.setdefault(key, diagnostic)
     with_notes = (
         (
             diagnostic,
@@ -265,4 +263,4 @@ def warnings(group: ArchiveGroup, experiment: Experiment | None = None) -> list[
     warners = [step_errors.warnings]
     if summed_up(group) is None:
         warners += [at_limits.warnings, grapple_warnings, undecided_warnings, idle_warnings]
-    return [warning for warner in warners for warning in warner(group, experiment)]
+    return [diagnostic for warner in warners for diagnostic in warner(group, experiment)]

@@ -1,5 +1,5 @@
 """The accuracy of an archive's numbers: errors due to the step, from its cases with shorter steps.
 
-`figures` computes the errors, `words` puts them in words, `limits` compares them with the deck's limits, and `warning`
-makes warnings about doubtful results.
+`figures` computes the errors, compares them with the deck's limits and puts them in words; `warning` makes warnings
+about doubtful results.
 """

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+import operator
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from batch.queries.signals import deck_unit, number_text
+from ic.printing.columns import count
 from met.analysis.step_error import StepError, instant_error, step_error
 from met.frozen import frozen
 from met.plan.judged import StepErrorLimit
@@ -17,6 +20,8 @@ from met.plan.judged import StepErrorLimit
 if TYPE_CHECKING:
     from batch.archive.read import ArchiveGroup
     from batch.archive.verified import Verified
+
+COMPARISONS = MappingProxyType({"<": operator.lt, "<=": operator.le, ">": operator.gt, ">=": operator.ge})
 
 
 @frozen
@@ -226,7 +231,7 @@ def _verdict(group: ArchiveGroup, limit: StepErrorLimit, verification: Verificat
         return StepErrorVerdict(limit.text, None, "no verified case has a finite value", limit)
     worst = max(cases, key=lambda case_error: _size(case_error, limit.share))
     size = _size(worst, limit.share)
-    missed = sum(not _is_within(_size(case, limit.share), limit) for case in cases)
+    missed = sum(not COMPARISONS[limit.comparison](_size(case, limit.share), limit.limit) for case in cases)
     if worst.error is None:
         text = worst.why
     elif limit.share:
@@ -237,10 +242,6 @@ def _verdict(group: ArchiveGroup, limit: StepErrorLimit, verification: Verificat
     among = f", the worst of {len(cases):,} verified cases" if len(cases) > 1 else ""
     text = f"{text} in case #{worst.case}{among}"
     return StepErrorVerdict(limit.text, not missed, text, limit, len(cases), missed, worst.case, size)
-
-
-def _is_within(size: float, limit: StepErrorLimit) -> bool:
-    return size <= limit.limit if limit.comparison == "<=" else size < limit.limit
 
 
 def _has_none(case: CaseError) -> bool:
@@ -278,8 +279,7 @@ def rounded(error: float) -> str:
 def about(verification: Verification) -> str:
     """A line about the verification, `± by the step: 5 cases at half and a quarter of the step, order 2.0`, with
     remarks."""
-    cases = "1 case" if verification.cases == 1 else f"{verification.cases:,} cases"
-    text = f"± by the step: {cases} at half and a quarter of the step"
+    text = f"± by the step: {count(verification.cases, 'case')} at half and a quarter of the step"
     orders = sorted(
         {
             f"{metric.order:.1f}"
@@ -288,7 +288,7 @@ def about(verification: Verification) -> str:
         }
     )
     if orders:
-        text += f", order {_between(orders)}"
+        text += f", order {' to '.join(dict.fromkeys((orders[0], orders[-1])))}"
     if unclear := [name for name, metric_error in verification.metrics.items() if not metric_error.clear]:
         known = [
             case_error.error
@@ -303,7 +303,3 @@ def about(verification: Verification) -> str:
             where = "" if verification.cases == 1 else f" in {metric.unknown:,}"
             text += f"; of {name} not known{where}: {metric.why}"
     return text
-
-
-def _between(orders: Sequence[str]) -> str:
-    return orders[0] if len(orders) == 1 else f"{orders[0]} to {orders[-1]}"

@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 import math
-import operator
-from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from batch.queries.requirements import GroupRequirement, group_requirements
 from batch.queries.signals import deck_unit, number_text
-from batch.queries.step_errors.figures import CaseError, Verification, figures, rounded
+from batch.queries.step_errors.figures import COMPARISONS, CaseError, Verification, figures, rounded
 from met.analysis.step_error import NEAR, StepError
-from met.diagnostic import Diagnostic, Label, Place
+from met.diagnostic import Diagnostic, warning
 
 if TYPE_CHECKING:
     from batch.archive.read import ArchiveGroup
@@ -24,8 +22,6 @@ MATTERS, LARGE = 0.01, 0.1
 
 MOST_HALVINGS = 10
 """Largest number of halvings of a step that are proposed as a remedy."""
-
-COMPARISONS = MappingProxyType({"<": operator.lt, "<=": operator.le, ">": operator.gt, ">=": operator.ge})
 
 
 def warnings(group: ArchiveGroup, experiment: Experiment | None = None) -> list[Diagnostic]:
@@ -75,7 +71,7 @@ def _undecided(
         helps.append(f"so it is in {len(those):,} of the {verification.cases:,} verified cases")
     place = None if experiment is None else experiment.requirements[required.place].place
     where = f"`{required.metric}` of case #{case.case} is {text}"
-    return _warning("D310", f"the step decides whether `{required.text}` is met: {where}", place, helps)
+    return warning("D310", f"the step decides whether `{required.text}` is met: {where}", place, help=helps)
 
 
 def _turned(case: CaseError, required: GroupRequirement) -> str:
@@ -129,7 +125,7 @@ def _unclear(
     if experiment is not None:
         path = group.variables[name].path
         place = next((use.place for use in experiment.structure.metrics if use.name == path), None)
-    return _warning("D311", message, place, helps)
+    return warning("D311", message, place, help=helps)
 
 
 def _lost(verification: Verification, experiment: Experiment | None) -> list[Diagnostic]:
@@ -152,7 +148,7 @@ def _lost(verification: Verification, experiment: Experiment | None) -> list[Dia
     message = (
         f"case #{position} reaches its end at the step of {1e3 * verification.step:g} ms, and does not at {share} of it"
     )
-    return [_warning("D312", message, None if experiment is None else experiment.place, helps)]
+    return [warning("D312", message, None if experiment is None else experiment.place, help=helps)]
 
 
 def _remedy(verification: Verification, case: CaseError, tolerance: float, wanted: str) -> str:
@@ -173,7 +169,3 @@ def _falls(error: StepError) -> bool:
 def _rate(verification: Verification, factor: int) -> str:
     """A multiple of the rate of the dynamics."""
     return f"{float(f'{factor / verification.step:.12g}'):.12g} Hz"
-
-
-def _warning(code: str, message: str, place: Place | None, helps: list[str]) -> Diagnostic:
-    return Diagnostic(code, message, None if place is None else Label(place), (), tuple(helps), "warning")
