@@ -9,10 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from batch.archive.stored import Stored
 from batch.queries.best import ENDS, Designs, Goal, Stretch
 from batch.queries.pool import CaseColumn, failure_lines
-from batch.queries.signals import number_text, number_texts, pretty_unit
+from batch.queries.signals import deck_unit, number_text, number_texts, pretty_unit
 from batch.queries.stability_words import KEPT, margin_words, stability_data, stability_texts, wrapped
 from batch.queries.summary import finite
 from ic.driver.write_values import WrittenValue
@@ -169,7 +168,11 @@ class BestAnswer:
         there."""
         assert self.best is not None
         return [
-            [axis.columns[0].label, _range_text(axis.columns[0], axis.values, stretch), _ends(stretch)]
+            [
+                axis.columns[0].label,
+                _range_text(axis.columns[0], axis.values[[stretch.first, stretch.last]]),
+                _ends(stretch),
+            ]
             for number, axis in enumerate(self.designs.axes)
             if (stretch := self.designs.stretch(self.best, number)) is not None
         ]
@@ -282,7 +285,7 @@ class BestAnswer:
         if designs.steps is not None:
             cells.append(["border", "cells", *(str(designs.steps[number]) for number in numbers)])
         for goal in self.shown_goals:
-            unit, scale = self._unit(goal)
+            scale, unit = self._unit(goal)
             values = self._worst(goal)[numbers] / scale
             cells.append([goal.text, unit, *("-" if math.isnan(value) else number_text(value) for value in values)])
         return [list(row) for row in zip(*cells, strict=True)]
@@ -291,17 +294,13 @@ class BestAnswer:
         """[design] a goal in the worst of its cases, SI."""
         return self.designs.worst(goal.values, largest=not goal.largest)
 
-    def _unit(self, goal: Goal) -> tuple[str, float]:
-        """The unit in which a goal is shown, and how many SI units it is."""
-        for column, variable in self._metrics():
-            if column.label == goal.text:
-                return column.unit, float(variable.attributes.get("deck_scale", 1.0))
+    def _unit(self, goal: Goal) -> tuple[float, str]:
+        """The unit in which a goal is shown, after how many SI units it is."""
+        for variable in self.designs.pool.variables("metric"):
+            if variable.path == goal.text:
+                return deck_unit(variable)
         unit = unit_text(goal.dimension)
-        return ("" if unit == "1" else pretty_unit(unit)), 1.0
-
-    def _metrics(self) -> Iterator[tuple[CaseColumn, Stored]]:
-        variables = {variable.path: variable for variable in self.designs.pool.variables("metric")}
-        return ((column, variables[column.label]) for column in self.designs.pool.metrics())
+        return 1.0, "" if unit == "1" else pretty_unit(unit)
 
     def settings(self, design: int) -> Iterator[tuple[str, str]]:
         """The choices that make a design: each path, and its value as a deck would write it."""
@@ -392,10 +391,7 @@ class BestAnswer:
             "cells_to_border": None if designs.steps is None else int(designs.steps[row.design]),
             "room": float(designs.room[row.design]),
             "stability": stability_data(self.judged.get(row.design)),
-            "worst": {
-                goal.text: float(designs.worst(goal.values, largest=not goal.largest)[row.design])
-                for goal in self.shown_goals
-            },
+            "worst": {goal.text: float(self._worst(goal)[row.design]) for goal in self.shown_goals},
         }
 
 
@@ -415,13 +411,13 @@ def _range(column: CaseColumn) -> str:
     """The range of a parameter under which designs are judged, in words."""
     if column.role == "choice":
         return f"{column.label} {', '.join(column.words)}"
-    ends = column.values[np.isfinite(column.values)]
-    low, high = number_texts([ends.min(), ends.max()])
-    return f"{column.label} {low} .. {high} {column.unit}".rstrip()
+    known = column.values[np.isfinite(column.values)]
+    return f"{column.label} {_range_text(column, [known.min(), known.max()])}"
 
 
-def _range_text(column: CaseColumn, values: np.ndarray, stretch: Stretch) -> str:
-    low, high = number_texts(float(values[level]) for level in (stretch.first, stretch.last))
+def _range_text(column: CaseColumn, ends: Iterable[float]) -> str:
+    """The range between two values of a column, in its unit: `0.1 .. 0.4 V*s/rad`."""
+    low, high = number_texts(ends)
     return f"{low} .. {high} {column.unit}".rstrip()
 
 

@@ -39,9 +39,9 @@ def table(
     """
     from ic.printing.columns import columns
 
-    positions = _listed(group, by, among, most)
-    left = 0 if most is None else max(0, len(positions) - most)
-    positions = positions[: len(positions) - left]
+    listed = _listed(group, by, among, most)
+    positions = listed[:most]
+    left = len(listed) - len(positions)
     outcomes = requirements.outcomes(group, positions)
     cells = [["", *(f"#{row}" for row in group.at("case", positions))]]
     cells.append(["id", *(case_id[:8] for case_id in group.at("case_id", positions))])
@@ -75,9 +75,9 @@ def table_across(
     structures. among: places, None for all"""
     from ic.printing.columns import columns
 
-    places = _among(ordering.places(pool, by), among)
-    left = 0 if most is None else max(0, len(places) - most)
-    places = places[: len(places) - left]
+    listed = _among(ordering.places(pool, by), among)
+    places = listed[:most]
+    left = len(listed) - len(places)
     cells = [["", "", *(f"#{case}" for case in pool.cases[places])]]
     cells.append(["id", "", *(case_id[:8] for case_id in pool.texts("case_id", places))])
     words = 0

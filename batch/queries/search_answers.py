@@ -21,6 +21,7 @@ from batch.queries.requirements import GroupRequirement, group_requirements, out
 from batch.queries.signals import number_text, pretty_unit
 from batch.queries.stability_words import KEPT, WIDTH, margin_words, stability_data, stability_texts, wrapped
 from ic.driver.write_values import WrittenValue
+from ic.printing.columns import count
 from met.frozen import frozen
 from met.outputs import quoted, setting_option, setting_path
 from met.plan import Experiment
@@ -128,10 +129,6 @@ class SearchAnswer:
         """True if a tuning was judged against drawn cases, so that other draws may confirm it or not."""
         return any(variable.attributes.get("design") for variable in self.group.role("coordinate"))
 
-    def value(self, best: Answer | None = None) -> str:
-        """The goal's value in the deck's unit, of the best, or of an earlier best."""
-        return self.goal((best or self.best).value)
-
     def goal(self, value: float) -> str:
         """A value of the goal, SI, in the deck's unit."""
         variable = next(metric for metric in self.group.role("metric") if metric.path == self.search.metric)
@@ -169,10 +166,10 @@ class SearchAnswer:
     def _by_slopes(self) -> list[str]:
         """Lines about a tuning along exact slopes: its steps, and why there were no more."""
         search = self.search
-        count, why_not = search.along_slopes, search.without_slopes
-        out = [f"  {count:,} of them along exact slopes of the metrics"] if count else []
+        steps, why_not = search.along_slopes, search.without_slopes
+        out = [f"  {steps:,} of them along exact slopes of the metrics"] if steps else []
         if why_not and search.gradients:
-            out += wrapped(f"no slopes {'at some candidates' if count else 'to go by'}: {why_not}")
+            out += wrapped(f"no slopes {'at some candidates' if steps else 'to go by'}: {why_not}")
         return out
 
     @cached_property
@@ -204,8 +201,8 @@ class SearchAnswer:
             self.goal(value).replace(" ", KEPT) if np.isfinite(value) else "none that meets all"
             for value in reached[~near]
         ]
-        count = f"{len(reached)} starts one alone came to {self.goal(float(best))}, the other{'s' * (len(others) > 1)}"
-        return wrapped(f"not sure that it is the best: of {count} to {', '.join(others)}; "
+        starts = f"{len(reached)} starts one alone came to {self.goal(float(best))}, the other{'s' * (len(others) > 1)}"
+        return wrapped(f"not sure that it is the best: of {starts} to {', '.join(others)}; "
                        "another `seed` or a larger `at_most` may find better")  # fmt: skip
 
     def _border(self) -> list[str]:
@@ -244,14 +241,13 @@ class SearchAnswer:
 
     @property
     def _cases(self) -> str:
-        generations = f"{self.generations:,} generation{'s' * (self.generations != 1)}"
-        return f"{self.group.count:,} case{'s' * (self.group.count != 1)} in {generations}"
+        return f"{count(self.group.count, 'case')} in {count(self.generations, 'generation')}"
 
     @property
     def _tried(self) -> str:
         """The number of candidates that were run, on all plants (the cases that they are judged on) or on some."""
-        count = len(np.unique(self._judged_cases[0][:, : len(self.search.parameters)], axis=0))
-        return f"{count:,} candidate{'s' * (count != 1)} tried"
+        candidates = np.unique(self._judged_cases[0][:, : len(self.search.parameters)], axis=0)
+        return f"{count(len(candidates), 'candidate')} tried"
 
     @property
     def _cause(self) -> list[str]:
@@ -272,7 +268,7 @@ class SearchAnswer:
             out += [f"  case #{self.position} of it fails; {self._cases}", *self._cause]
         else:
             among = f" in the worst of {best.tried} cases of {search.against}" if best.all > 1 else ""
-            out.append(f"  {search.metric} is {self.value()}{among}; {self._cases}")
+            out.append(f"  {search.metric} is {self.goal(best.value)}{among}; {self._cases}")
         if best.confirmed and not best.stands and search.budget - self.group.count < SHORTEST * best.all:
             out.append(f"  its cases are spent, of {search.at_most:,} at most; a larger `at_most` goes on")
         if not best.stands and search.steers:
@@ -316,7 +312,10 @@ class SearchAnswer:
         if np.isnan(best.value):
             return [f"{worst}: {case}, in which {search.metric} has no value", f"  of {self._cases}"]
         which = "largest" if search.largest else "least"
-        out = [f"{worst}: {search.metric} = {self.value()}, {case}", f"  the {which} {search.metric} of {self._cases}"]
+        out = [
+            f"{worst}: {search.metric} = {self.goal(best.value)}, {case}",
+            f"  the {which} {search.metric} of {self._cases}",
+        ]
         return [*out, *self._settled()]
 
     def _settled(self) -> list[str]:

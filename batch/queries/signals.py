@@ -20,7 +20,6 @@ from met.frozen import frozen
 from met.plan import Experiment, Plan
 from met.plan.channel import FAMILIES, channel_paths, joint_of
 from met.unit_parser import parse_unit
-from met.units import Measure
 
 SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
@@ -236,10 +235,8 @@ class DeckUnits:
     def __init__(self, archive: ArchiveFile | Plan | None, group: ArchiveGroup) -> None:
         self.group = group
         plan = written_plan(archive) if isinstance(archive, ArchiveFile) else archive
-        experiments = (
-            [] if plan is None else [experiment for experiment in plan.experiments if experiment.name == group.name]
-        )
-        self.experiment: Experiment | None = experiments[0] if experiments else None
+        experiments = {} if plan is None else {experiment.name: experiment for experiment in plan.experiments}
+        self.experiment: Experiment | None = experiments.get(group.name)
         self._votes = _votes(self.experiment, plan) if plan is not None and self.experiment is not None else {}
         self._required = self._of_metrics()
 
@@ -299,15 +296,9 @@ def _text(place: Place, texts: Mapping[str, list[str]]) -> str:
 
 
 def _scale(unit: str, si: str) -> float:
-    """The size of a unit in an SI unit; 0 where they are of different kinds."""
-    mine, theirs = _measure(unit), _measure(si)
-    if mine is None or theirs is None or mine.dimension != theirs.dimension:
-        return 0.0
-    return mine.scale / theirs.scale
-
-
-def _measure(unit: str) -> Measure | None:
+    """The size of a unit in an SI unit; 0 where they are of different kinds, or one cannot be read."""
     try:
-        return parse_unit(unit)
+        mine, theirs = parse_unit(unit), parse_unit(si)
     except ValueError:
-        return None
+        return 0.0
+    return mine.scale / theirs.scale if mine.dimension == theirs.dimension else 0.0

@@ -8,6 +8,7 @@ from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any
 
 from batch.queries.signals import number_text
+from ic.printing.columns import count
 from met.plan.searches import USUAL_MARGIN, JudgedDesign, LeastMargins, allowed_gain
 
 if TYPE_CHECKING:
@@ -53,7 +54,7 @@ def stability_texts(design: JudgedDesign | None, least_margin: float) -> list[st
     if design.margins is None:
         return [f"stability not judged: {design.why_not}"]
     margins = design.margins
-    looked_at = f"{_count(margins.loops, 'loop')} in {_count(margins.cases, 'case')} at {_count(margins.poses, 'pose')}"
+    looked_at = f"{count(margins.loops, 'loop')} in {count(margins.cases, 'case')} at {count(margins.poses, 'pose')}"
     out = [f"stability: {margin_words(margins)}, the least of {looked_at}, dry friction released"]
     if least_margin <= margins.disk < USUAL_MARGIN:
         out.append(f"less than usual, which is a disk margin of {USUAL_MARGIN}: {_allowance(USUAL_MARGIN)}")
@@ -85,10 +86,6 @@ def _allowance(disk: float) -> str:
     factor = allowed_gain(disk)
     gain = f"{factor:.4g} times the gain" if math.isfinite(factor) else "any gain"
     return f"{gain} or {math.degrees(2.0 * math.atan(0.5 * disk)):.3g} deg"
-
-
-def _count(number: int, word: str) -> str:
-    return f"{number:,} {word}{'s' * (number != 1)}"
 
 
 def stability_data(design: JudgedDesign | None) -> dict[str, Any] | None:

@@ -108,7 +108,7 @@ def search_answer(archive: ArchiveFile, group: ArchiveGroup) -> DesignAnswer | N
     looks = answer.progress(MOST_LOOKS)
     for number, cases, best in looks:
         how = "a case fails" if best.failed else f"misses {', '.join(best.missed)}" if best.missed else "meets all"
-        row = (str(number), f"{cases:,}", answer.value(best), how, *([str(best.tried)] * tunes))
+        row = (str(number), f"{cases:,}", answer.goal(best.value), how, *([str(best.tried)] * tunes))
         if not rows or rows[-1][2:] != row[2:]:
             rows.append(row)
     row_numbers = np.unique(np.linspace(0, len(rows) - 1, min(len(rows), MOST_ROWS)).astype(int))
