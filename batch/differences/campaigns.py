@@ -128,7 +128,7 @@ def _experiment(
     scores = _Scores(matched.count)
     _ended(a, b, matched, out)
     by_step = of_difference(figures(a), figures(b))
-    for name in matching.names([v.name for v in a.role("metric")], [v.name for v in b.role("metric")]):
+    for name in matching.names(a, b, "metric"):
         out.signals.append(_metric(a, b, matched, name, allowed, scores))
         out.signals[-1].by_step = by_step.get(name, float("nan"))
     if note := step_error_note(out):
@@ -384,7 +384,7 @@ def _signals(
     a: ArchiveGroup, b: ArchiveGroup, matched: MatchedCases, allowed: Tolerances, scores: _Scores, about: ExperimentDiff
 ) -> Iterator[SignalDiff]:
     """The differences of each signal of both, at common instants; notes on these go to `about`."""
-    names = matching.names([v.name for v in a.role("signal")], [v.name for v in b.role("signal")])
+    names = matching.names(a, b, "signal")
     if not names:
         return
     places, ia, ib = _recorded(a, b, matched, about)

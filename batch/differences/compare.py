@@ -46,10 +46,6 @@ class Difference:
         """The size of the difference; not-a-number on one side only counts as infinite."""
         return float("inf") if self.nan else self.largest
 
-    @property
-    def verdict(self) -> str:
-        return DIFFERENT if self.beyond else EQUIVALENT
-
 
 def compare(
     a: np.ndarray,

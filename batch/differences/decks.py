@@ -11,6 +11,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import PurePosixPath
 from typing import Any
 
+from ic.printing.columns import count
 from met.frozen import frozen
 
 CONTEXT = 1
@@ -76,7 +77,7 @@ def decks(a: Mapping[str, str], b: Mapping[str, str]) -> Decks:
         stale |= {(old, number) for number, line in enumerate(before, 1) if line not in known[1]}
         if not old or not new:
             changes.append(
-                DeckFileChange(f"{old or new} is {'new' if new else 'gone'}: {_lines(len(before) + len(now))}")
+                DeckFileChange(f"{old or new} is {'new' if new else 'gone'}: {count(len(before) + len(now), 'line')}")
             )
         elif a[old] != b[new] or PurePosixPath(old).name != PurePosixPath(new).name:
             name = new if old == new else f"{old}, now {new}"
@@ -125,12 +126,8 @@ def _counted(before: str, after: str) -> str:
     """Say how many lines were added and removed."""
     old, now = (Counter(text.splitlines(keepends=True)) for text in (before, after))
     new, gone = (now - old).total(), (old - now).total()
-    text = f"{_lines(new)} new, {gone} gone" if new or gone else "its lines are in another order"
+    text = f"{count(new, 'line')} new, {gone} gone" if new or gone else "its lines are in another order"
     return text if before != after else "the same lines"
-
-
-def _lines(count: int) -> str:
-    return f"{count:,} line{'s' if count != 1 else ''}"
 
 
 def _unified(before: Sequence[str], now: Sequence[str]) -> Iterator[str]:

@@ -6,8 +6,6 @@ is varied alone; so the order of cases, and what else is in the archive, do not 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 
 from batch.archive.read import ArchiveFile, ArchiveGroup
@@ -103,6 +101,6 @@ def _nearest(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     return np.where(np.abs(b[before] - a) < np.abs(b[after] - a), before, after)
 
 
-def names(a: Sequence[str], b: Sequence[str]) -> list[str]:
-    """The names of both, in the order of the first, then of the second."""
-    return list(dict.fromkeys([*a, *b]))
+def names(a: ArchiveGroup, b: ArchiveGroup, role: str) -> list[str]:
+    """The names of the variables of a role in either group, in the order of the first, then of the second."""
+    return list(dict.fromkeys(variable.name for group in (a, b) for variable in group.role(role)))

@@ -53,7 +53,7 @@ def provenance_changes(
         meaning=(*causes, *(meaning or (() if causes else follows))),
         follows=tuple(follows) if meaning or causes else (),
         defaults=tuple(defaults),
-        structure=tuple(group.name for group, two in pairs if _unlike(group, two, "structure_key")),
+        structure=tuple(group.name for group, two in pairs if _other_structure(group, two)),
         code=tuple(group.name for group, two in pairs if _other_code(group.attributes, two.attributes)),
         results=tuple((group.name, name) for group, two in pairs for name in _other_results(group, two)),
         kept=tuple(
@@ -83,10 +83,10 @@ def _other_results(a: ArchiveGroup, b: ArchiveGroup) -> Iterator[str]:
                 yield name
 
 
-def _unlike(a: ArchiveGroup, b: ArchiveGroup, name: str) -> bool:
-    """True if both groups have this attribute, with different values."""
-    value_a, two = a.attributes.get(name), b.attributes.get(name)
-    return value_a is not None and two is not None and value_a != two
+def _other_structure(a: ArchiveGroup, b: ArchiveGroup) -> bool:
+    """True if the structures of two groups have different keys; False where one has none."""
+    key_a, two = a.attributes.get("structure_key"), b.attributes.get("structure_key")
+    return key_a is not None and two is not None and key_a != two
 
 
 def _versions(a: ArchiveFile, b: ArchiveFile) -> Iterator[str]:
@@ -124,12 +124,11 @@ def _meaning(
     before, now = plans
     if isinstance(before, str) or isinstance(now, str):
         return [f"the plan cannot be read here: {why}" for why in plans if isinstance(why, str)], [], []
-    several = [
-        (group.name, two.name) for group, two in pairs if group.name in _names(before) and two.name in _names(now)
-    ]
+    planned_a, planned_b = ({experiment.name: experiment for experiment in plan.experiments} for plan in (before, now))
+    several = [(group.name, two.name) for group, two in pairs if group.name in planned_a and two.name in planned_b]
     names_of: dict[tuple[int, str], list[str]] = {}
     for name_a, two in several:
-        old, new = _experiment(before, name_a), _experiment(now, two)
+        old, new = planned_a[name_a], planned_b[two]
         fresh = {
             path: quantity
             for path, quantity in new.parameters.items()
@@ -160,10 +159,6 @@ def _follows(change: Change, texts: Decks) -> bool:
     )  # values without a file were written on a command line
 
 
-def _names(plan: Plan) -> set[str]:
-    return {experiment.name for experiment in plan.experiments}
-
-
 def _tolerances(before: Experiment, now: Experiment) -> Iterator[str]:
     """Changes of tolerances, which change no number but its verdict."""
     old, new = ({tolerance.of: tolerance for tolerance in experiment.tolerances} for experiment in (before, now))
@@ -171,7 +166,3 @@ def _tolerances(before: Experiment, now: Experiment) -> Iterator[str]:
         texts = [side[name].text if name in side else "none" for side in (old, new)]
         if name not in old or name not in new or old[name].value != new[name].value:
             yield f"tolerances.{name}: {texts[0]} -> {texts[1]}"
-
-
-def _experiment(plan: Plan, name: str) -> Experiment:
-    return next(experiment for experiment in plan.experiments if experiment.name == name)

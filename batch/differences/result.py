@@ -69,7 +69,6 @@ class SignalDiff:
     lower: int = 0
     chance: float = float("nan")
     why: str = ""
-    note: str = ""
     low: float = float("inf")
     high: float = float("-inf")
     most: float = 0.0

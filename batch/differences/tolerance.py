@@ -32,10 +32,6 @@ class SignalTolerance:
     relative: float = 0.0
     time: float = 0.0
 
-    @property
-    def allows_any(self) -> bool:
-        return bool(self.absolute or self.relative or self.time)
-
 
 @frozen
 class Tolerances:

@@ -14,6 +14,7 @@ from batch.differences.samples import LEVEL, MetricSamples
 from batch.queries.evidence_table import texts_of
 from batch.queries.pool import STATUS, ranges
 from batch.queries.signals import number_text
+from ic.printing.columns import count
 from met.frozen import frozen
 from met.messages.visible import visible
 from met.outputs import quoted
@@ -63,17 +64,16 @@ def unmatched_runs(difference: Diff) -> list[str]:
 def heading(experiment: ExperimentDiff) -> str:
     """The names of a pair of experiments, the number of their common cases, and the verdict on these."""
     names = dict.fromkeys([experiment.name_a, experiment.name_b])
-    count = experiment.cases.count
     how = experiment.of_values
     if how != experiment.verdict:
         how = f"{how}, with other requirements"
-    return f"{' and '.join(names)}: {count:,} case{'s' if count != 1 else ''} in both, {how}"
+    return f"{' and '.join(names)}: {count(experiment.cases.count, 'case')} in both, {how}"
 
 
 def unmatched_cases(difference: Diff, experiment: ExperimentDiff) -> list[str]:
     """Cases that only one archive has."""
     return [
-        f"{len(cases):,} case{'s' if len(cases) > 1 else ''} only in {where}: {ranges(cases)}"
+        f"{count(len(cases), 'case')} only in {where}: {ranges(cases)}"
         for cases, where in ((experiment.only_a, difference.a), (experiment.only_b, difference.b))
         if cases
     ]
@@ -88,10 +88,10 @@ def tolerance_lines(difference: Diff, experiment: ExperimentDiff) -> list[str]:
 
 def requirement_lines(experiment: ExperimentDiff) -> list[str]:
     """Lines about requirements that have changed, or are met by another number of cases."""
-    count = experiment.cases.count
+    cases = experiment.cases.count
     return [
         f"require {requirement_text(requirement)}  "
-        f"{met_by_text(requirement.met_before, requirement.met_now, count)}{pairs_text(requirement)}"
+        f"{met_by_text(requirement.met_before, requirement.met_now, cases)}{pairs_text(requirement)}"
         for requirement in experiment.requirements
         if requirement.has_changed
     ]
@@ -176,7 +176,7 @@ def endings(experiment: ExperimentDiff) -> list[Ending]:
     order = sorted(kinds, key=lambda kind: not kind.startswith(("fail", "are timed", "are lost")))
     return [
         Ending(
-            f"{len(cases):,} case{'s' if len(cases) > 1 else ''} {_of_one(kind, len(cases))}",
+            f"{count(len(cases), 'case')} {_of_one(kind, len(cases))}",
             ranges(sorted(case.case for case in cases)),
             tuple(cases),
         )
@@ -274,7 +274,7 @@ def signal_row(signal: SignalDiff) -> SignalRow:
     if signal.verdict == IDENTICAL:
         return SignalRow(signal.name, IDENTICAL, f"{signal.compared:,}")
     unit = signal.deck_unit if signal.largest < float("inf") else ""
-    count = {DIFFERENT: signal.different, EQUIVALENT: signal.equivalent}.get(signal.verdict, signal.compared)
+    unlike = signal.different or signal.equivalent
     place = signal.place
     where = first = ""
     if place is not None:
@@ -292,7 +292,7 @@ def signal_row(signal: SignalDiff) -> SignalRow:
     return SignalRow(
         name=signal.name,
         verdict=signal.verdict,
-        cases=f"{count:,} of {signal.compared:,}",
+        cases=f"{unlike:,} of {signal.compared:,}",
         largest=largest,
         unit=unit if largest else "",
         share=share,
