@@ -94,32 +94,62 @@ class ExportFormat:
 
     def check_request(self, request: ExportRequest, target: Path) -> None:
         """Refuse options that this format does not use. Raises Problem E375, E376."""
-        if request.layout and "layout" not in self.options:
-            helps = "`-o FILE.mcap` writes one, and its layout"
-            raise Problem(error("E375", f"a layout shows an MCAP file, and {target} is none", help=helps))
-        if not request.meshes and "meshes" not in self.options:
-            helps = "leave `--no-meshes` out"
-            raise Problem(error("E375", f"an MCAP file draws the arm, and {target} is none", help=helps))
-        if request.table == "metrics" and "metrics" not in self.tables:
-            helps = "; ".join(filter(None, ("`-o FILE.csv` writes one", self.metrics_in)))
-            message = f"{target} would hold histories: {self.title} is no table of metrics"
-            raise Problem(error("E376", message, help=helps))
-        if request.table == "evidence" and "evidence" not in self.tables:
-            message = f"{target} would hold no requirements: {self.title} is no table of evidence"
-            raise Problem(error("E376", message, help="`-o FILE.csv` writes one"))
-        if "histories" not in self.tables and (request.table == "histories" or request.signals):
-            message = f"{target} would be a table of metrics: {self.title} holds no histories"
-            raise Problem(error("E376", message, help="`-o FILE.csv` and `-o FILE.mcap` hold them"))
-        if request.units != "si" and "units" not in self.options:
-            message = f"{target} would be in SI: {self.title} has no other units"
-            raise Problem(error("E376", message, help="`-o FILE.csv` can be in the deck's"))
-        if request.table == "evidence" and (request.signals or request.named):
-            kind = f"signal `{request.signals[0]}`" if request.signals else "case"
-            message = f"evidence is of requirements over all cases: its table has no {kind}"
-            raise Problem(error("E376", message, help="leave out `--evidence`, or `--signals` and `--case`"))
-        if request.table == "metrics" and request.signals:
-            message = f"signals are histories: a table of metrics has no `{request.signals[0]}`"
-            raise Problem(error("E376", message, help="leave out `--metrics`, or `--signals`"))
+        evidence, metrics = request.table == "evidence", request.table == "metrics"
+        signal = request.signals[0] if request.signals else ""
+        refusals = (
+            (
+                request.layout and "layout" not in self.options,
+                "E375",
+                f"a layout shows an MCAP file, and {target} is none",
+                "`-o FILE.mcap` writes one, and its layout",
+            ),
+            (
+                not request.meshes and "meshes" not in self.options,
+                "E375",
+                f"an MCAP file draws the arm, and {target} is none",
+                "leave `--no-meshes` out",
+            ),
+            (
+                metrics and "metrics" not in self.tables,
+                "E376",
+                f"{target} would hold histories: {self.title} is no table of metrics",
+                "; ".join(filter(None, ("`-o FILE.csv` writes one", self.metrics_in))),
+            ),
+            (
+                evidence and "evidence" not in self.tables,
+                "E376",
+                f"{target} would hold no requirements: {self.title} is no table of evidence",
+                "`-o FILE.csv` writes one",
+            ),
+            (
+                "histories" not in self.tables and (request.table == "histories" or request.signals),
+                "E376",
+                f"{target} would be a table of metrics: {self.title} holds no histories",
+                "`-o FILE.csv` and `-o FILE.mcap` hold them",
+            ),
+            (
+                request.units != "si" and "units" not in self.options,
+                "E376",
+                f"{target} would be in SI: {self.title} has no other units",
+                "`-o FILE.csv` can be in the deck's",
+            ),
+            (
+                evidence and (request.signals or request.named),
+                "E376",
+                "evidence is of requirements over all cases: its table has no "
+                + (f"signal `{signal}`" if request.signals else "case"),
+                "leave out `--evidence`, or `--signals` and `--case`",
+            ),
+            (
+                metrics and request.signals,
+                "E376",
+                f"signals are histories: a table of metrics has no `{signal}`",
+                "leave out `--metrics`, or `--signals`",
+            ),
+        )
+        for refused, code, message, helps in refusals:
+            if refused:
+                raise Problem(error(code, message, help=helps))
 
 
 def find(name: str) -> ExportFormat:
