@@ -13,6 +13,7 @@ from batch.archive.stored import Stored
 from batch.export.picking import ExportedCase
 from batch.export.wire import MessageField
 from batch.queries.pool import STATUS
+from batch.queries.requirements import requirement_texts
 from batch.queries.signals import case_text, value_text
 from met.frozen import frozen
 from met.run import DONE, FAILED
@@ -116,7 +117,7 @@ def _requirements(group: ArchiveGroup, position: int) -> list[tuple[str, str, st
     """Text, outcome and metric of each requirement."""
     if "met" not in group.variables:
         return []
-    texts = [str(text) for text in group.values("requirement")]
+    texts = requirement_texts(group)
     judged = group.variables["requirement"].attributes.get("metric", [])
     metrics: Sequence[str] = judged if isinstance(judged, list) else [str(judged)]
     metrics = metrics if len(metrics) == len(texts) else [""] * len(texts)

@@ -7,16 +7,16 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
-from pathlib import Path
 from typing import Any
 
 from batch.export import scene, topics
-from batch.export.output import whole
 from batch.export.poses import PosedArm
 from batch.plotting.layout import COLOURS
 from batch.queries.signals import pretty_unit
 
 ENDING = ".layout.json"
+"""The ending of the layout beside an export, in place of the export's own."""
+
 PLOTTED = ("q", "qd", "tau")
 """Signals with a panel of their own, if they exist; else the first existing ones."""
 
@@ -26,17 +26,6 @@ GHOST = "55"
 
 DISTANCE, GRID, AXES = 2.6, 4.0, 0.08
 """Distance of the camera from the base, edge of the grid, length of a frame's axes, each in sizes of the arm."""
-
-
-def beside(output: Path) -> Path:
-    """The path of an export's layout."""
-    return output.with_suffix(ENDING)
-
-
-def write(output: Path, text: str) -> None:
-    """Write a layout. Raises Problem E305."""
-    with whole(output) as sink:
-        sink.write(memoryview(text.encode()))
 
 
 def text(arms: Sequence[PosedArm]) -> str:

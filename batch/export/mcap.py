@@ -333,10 +333,11 @@ class Mcap(ExportFormat):
         posed_arms, note = [solid, *ghosts], solid.meshes.words
         if not request.layout:
             return WrittenExport(write(file, posed_arms, target), note=note)
-        text, beside = layout.text(posed_arms), layout.beside(target)
+        text, beside = layout.text(posed_arms), target.with_suffix(layout.ENDING)
         check(beside, file.path, lambda path: path.read_text("utf-8", "replace") == text, force=request.force)
         rows = write(file, posed_arms, target)
-        layout.write(beside, text)
+        with whole(beside) as sink:
+            sink.write(memoryview(text.encode()))
         return WrittenExport(rows, beside, note)
 
 
