@@ -91,19 +91,20 @@ def write(experiment: Experiment, output: Path) -> ModuleFiles:
     text = json.dumps(description, indent=1, allow_nan=False) + "\n"
     beside = output.with_suffix(".json")
     for path, data in ((output, module.code), (beside, text.encode())):
-        _write(path, data)
+        _write(path, data, "E470")
     return ModuleFiles(output, beside, description)
 
 
 def write_fmu(experiment: Experiment, output: Path, version: int) -> Fmu:
     """Write the FMU of an experiment. version: of FMI. Raises Problem E470."""
     fmu = fmu_of(experiment, version)
-    _write(output, fmu.data)
+    _write(output, fmu.data, "E470")
     return fmu
 
 
-def _write(path: Path, data: bytes) -> None:
-    with writing(path, code="E470", help=ELSEWHERE), whole_file(path) as file:
+def _write(path: Path, data: bytes, code: str) -> None:
+    """Write a file, whole or not at all. Raises a Problem of this code where that cannot be."""
+    with writing(path, code=code, help=ELSEWHERE), whole_file(path) as file:
         file.write(data)
 
 
@@ -117,8 +118,7 @@ def check_page(output: Path) -> None:
 
 def write_page(text: str, output: Path) -> None:
     """Write the page under its name, whole or not at all. Raises Problem E474."""
-    with writing(output, code="E474", help=ELSEWHERE), whole_file(output) as file:
-        file.write(text.encode())
+    _write(output, text.encode(), "E474")
 
 
 def _is_page(path: Path) -> bool:

@@ -10,7 +10,7 @@ page by that archive's own code, or a log of measured signals (`batch.measured.l
 from __future__ import annotations
 
 import base64
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -135,10 +135,13 @@ def _beside(
     """The data of the other archive or log on the page: for an archive everything known about it, for a log its numbers
     at the rows of a run."""
     name = visible(Path(against).name)
-    if is_archive(against):
+    if names_archive(str(against)):
         with ArchiveFile(against) as other:
             other.need_every_row("a page that simulates")
-            theirs, other_experiment = other_group(file, group, other)
+            (matched,) = beside(file, [group], other)
+            assert matched is not None
+            theirs = matched.group
+            other_experiment = next(planned for planned in other.plan().experiments if planned.name == theirs.name)
             units = [described_column["unit"] for described_column in described_columns(experiment)]
             data = data_of(other_experiment, other, theirs)
             data["arm"].pop("acting", None)  # of a second arm only the shape is drawn
@@ -186,7 +189,11 @@ def data_of(
     known = {name.removeprefix("metrics."): name for name in stored}
     visible_description: dict[str, Any] = visible_texts(description)
     metrics = [*description["metrics"], *description["not_computed"]]
-    columns = list(_in_deck_units(DeckUnits(archive, group), description["columns"]))
+    units = DeckUnits(archive, group)
+    columns = [
+        units.panel(Panel(column["signal"], "", column["unit"], column["signal"], (), ()))
+        for column in description["columns"]
+    ]
     lacking = [metric["name"] for metric in metrics if metric["name"] not in known]
     with reading(group.path):
         if lacking:
@@ -214,18 +221,10 @@ def data_of(
         },
         "signalAbout": {visible(recording.name): visible(recording.doc) for recording in experiment.structure.record},
         "springs": [f"{joint}.q" for joint in sorted(experiment.structure.springs)],
-        "columnUnits": [_unit(unit) for _, unit in columns],
-        "columnScales": [scale for scale, _ in columns],
+        "columnUnits": [_unit(column.unit) for column in columns],
+        "columnScales": [column.scale for column in columns],
         "arm": arm,
     }  # fmt: skip
-
-
-def _in_deck_units(units: DeckUnits, columns: Sequence[Mapping[str, str]]) -> Iterator[tuple[float, str]]:
-    """The divisor of each column's SI values, and the unit they are then in."""
-    for column in columns:
-        panel = Panel(column["signal"], "", column["unit"], column["signal"], (), ())
-        in_unit = units.panel(panel)
-        yield (in_unit.scale, in_unit.unit)
 
 
 def _unit(unit: str) -> str:
@@ -295,20 +294,6 @@ def page_text(
 
 
 NANOSECOND = 1e-9
-
-
-def other_group(archive: ArchiveFile, group: ArchiveGroup, other: ArchiveFile) -> tuple[ArchiveGroup, Experiment]:
-    """The other archive's run or sweep that is matched with `group`: it varies the same parameters. Raises Problem E393
-    where they have no case in common."""
-    (matched,) = beside(archive, [group], other)
-    assert matched is not None
-    theirs = next(experiment for experiment in other.plan().experiments if experiment.name == matched.group.name)
-    return matched.group, theirs
-
-
-def is_archive(path: str | Path) -> bool:
-    """True for the name of an archive; other files are read as logs."""
-    return names_archive(str(path))
 
 
 COVERED = 0.9
