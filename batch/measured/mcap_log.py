@@ -286,11 +286,11 @@ def _numbers(message: Any, path: tuple[str, ...] = ()) -> Iterator[tuple[tuple[s
 
 def _uncompressed(chunk: Any) -> bytes:
     """The records of a chunk, whose declared sizes are not trusted. Raises ValueError."""
+    import zstandard
+
     data: bytes = chunk.data
     try:
         if chunk.compression == "zstd":
-            import zstandard
-
             with zstandard.ZstdDecompressor(max_window_size=MOST_RECORD).stream_reader(data) as stream:
                 data = stream.read(MOST_RECORD + 1)
         elif chunk.compression == "lz4":
@@ -299,18 +299,11 @@ def _uncompressed(chunk: Any) -> bytes:
             data = LZ4FrameDecompressor().decompress(data, MOST_RECORD + 1)
         elif chunk.compression:
             raise ValueError(f"it is compressed by {chunk.compression[:SHOWN]}, and zstd or lz4 are known")
-    except _unpacking_errors() as reason:
+    except (zstandard.ZstdError, RuntimeError, EOFError) as reason:  # lz4 raises RuntimeErrors
         raise ValueError(f"a chunk cannot be unpacked: {reason}") from None
     if len(data) > MOST_RECORD:
         raise ValueError(f"a chunk has more than {MOST_RECORD >> 20} MiB")
     return data
-
-
-def _unpacking_errors() -> tuple[type[Exception], ...]:
-    """The errors that the unpackers raise: lz4 a RuntimeError, zstandard its own."""
-    import zstandard
-
-    return zstandard.ZstdError, RuntimeError, EOFError
 
 
 def _short(name: str) -> str:

@@ -165,13 +165,10 @@ def compare(
 
 
 def _span(times: Sequence[np.ndarray]) -> tuple[float, float]:
-    """The first and the last of all these instants, s."""
-    non_empty = [time for time in times if len(time)]
-    return (
-        (min(float(time[0]) for time in non_empty), max(float(time[-1]) for time in non_empty))
-        if non_empty
-        else (0.0, 0.0)
-    )
+    """The first and the last of all these instants, s; 0 and 0 where there are none."""
+    first = min((float(time[0]) for time in times if len(time)), default=0.0)
+    last = max((float(time[-1]) for time in times if len(time)), default=0.0)
+    return first, last
 
 
 def _residual(
