@@ -146,7 +146,8 @@ class Designs:
     def met(self) -> np.ndarray:
         """The share of each design's cases that meet each demand, [design, demand]."""
         holds = self.pool.outcomes == 1 if self.pool.requirements else (self.pool.status == DONE)[:, None]
-        return self._share(holds)
+        counts = [np.bincount(self.of_case, weights=column, minlength=self.count) for column in holds.T]
+        return np.stack(counts, axis=1) / self.cases[:, None]
 
     @cached_property
     def meets(self) -> np.ndarray:
@@ -164,11 +165,6 @@ class Designs:
         outcomes = self.pool.outcomes[ended] if self.pool.requirements else np.ones((int(ended.sum()), 1))
         short = ~self.meets[design] & (outcomes != 1).any(axis=0)
         return [text for text, falls_short in zip(self.demands, short, strict=True) if falls_short]
-
-    def _share(self, holds: np.ndarray) -> np.ndarray:
-        """The share of each design's cases in which each of these holds."""
-        counts = [np.bincount(self.of_case, weights=column, minlength=self.count) for column in holds.T]
-        return np.stack(counts, axis=1) / self.cases[:, None]
 
     @cached_property
     def good(self) -> np.ndarray:
