@@ -76,7 +76,7 @@ class Tolerances:
         return {called: self.absolute[name][1] for called, name in names.items() if name in self.absolute}
 
     def words(self) -> list[str]:
-        """Each tolerance in words."""
+        """The tolerances in words, one text each: `qd 1e-6 rad/s`, `rel 1e-9`, `time 0.001 s`."""
         of_all = (("rel", self.relative, ""), ("time", self.time, " s"))
         return [
             *(f"{name} {text}" for name, (_, text) in self.absolute.items()),

@@ -185,7 +185,7 @@ def endings(experiment: ExperimentDiff) -> list[Ending]:
 
 
 def _kind(ending: EndingDiff) -> str:
-    """How cases ended otherwise, in words: `fail that did not`."""
+    """The change between two endings of a case, in words: `fail that did not`."""
     if ending.before == ending.after:
         return f"{STATUS.get(ending.after, 'failed')} earlier or later"
     if ending.before == 0:

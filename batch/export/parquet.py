@@ -87,7 +87,7 @@ def _metadata(unit: str, about: str) -> dict[str, str]:
 
 
 def _one_each(cases: Sequence[ExportedCase]) -> list[ExportedCase]:
-    """One case of each structure."""
+    """One of the exported cases of each structure of their sweeps."""
     return list({case.group.name: case for case in cases}.values())
 
 

@@ -94,6 +94,7 @@ class _Log:
     """A log while it is being read."""
 
     def __init__(self, path: str, columns: Sequence[Mapping[str, str]]) -> None:
+        """Begin with no record read. columns: of the run, the channel, signal and SI unit of each"""
         self.path = path
         self.units = {column["channel"]: column["unit"] for column in columns}
         self.signals: dict[str, set[str]] = {}

@@ -174,8 +174,8 @@ def _span(times: Sequence[np.ndarray]) -> tuple[float, float]:
 def _residual(
     name: str, pair: Pair, courses: Mapping[str, ComputedChannel], units: Mapping[str, str], joint: str
 ) -> Residual:
-    """What is left of a channel where the run's numbers are taken from the log's, and what it follows. joint: its
-    joint, if any"""
+    """The residual of a channel, the log's numbers less the run's, and the causes that it follows. joint: the
+    channel's, "" where it has none"""
     residual, usual = pair.residual, pair.usual()
     largest = int(np.argmax(np.abs(residual)))
     correlation, white = _whiteness(usual.residual)
@@ -313,7 +313,7 @@ def _explained(pair: Pair, features: Sequence[_Feature]) -> tuple[FollowedCause,
 
 
 def _varies_enough(feature: _Feature, numbers: np.ndarray, residual: np.ndarray) -> bool:
-    """Whether a feature changes, and is no delay of more than what a log's clock is tried with."""
+    """True if a feature changes over the log, and is no delay beyond those that the log's clock is tried with."""
     if not np.isfinite(numbers).all() or np.ptp(numbers, axis=0).max() == 0.0:
         return False
     return feature.unit != "s" or abs(float(_fitted(residual, numbers)[1])) <= LATEST

@@ -58,7 +58,8 @@ def answer_outcome(group_answer: SearchAnswer) -> AnswerOutcome:
 
 
 def _required(answer: SearchAnswer, requirement: GroupRequirement) -> AnswerRequirement:
-    """How a requirement came out in the cases of a search's answer, with the furthest value and others that miss it."""
+    """The outcome of a requirement in the cases of a search's answer, with the furthest value, and others that miss
+    it."""
     group, cases = answer.group, np.array(answer.best.cases)
     variable, values = group.variables[requirement.metric], group.values(requirement.metric)
     met, numbers = outcomes(group)[:, requirement.place], group.values("case")
@@ -109,7 +110,7 @@ def _cases(answer: SearchAnswer, *, every: bool = True) -> str:
 
 
 def _all(answer: SearchAnswer) -> str:
-    return f"{'meets' if answer.required else 'reaches'} {'all requirements' if answer.required else 'its end'}"
+    return "meets all requirements" if answer.required else "reaches its end"
 
 
 def _misses(judged: tuple[AnswerRequirement, ...], *, named: bool) -> str:
@@ -135,19 +136,14 @@ def _of_tuning(answer: SearchAnswer, judged: tuple[AnswerRequirement, ...]) -> s
         return f"The answer was tried in {best.tried:,} of {best.all:,} cases of {sweep} alone"
     if not best.stands:
         return f"The answer has no {answer.search.metric} in case #{answer.position}"
+    text = f"The answer {_all(answer)}{(cases := _cases(answer)) and f' in {cases}'}"
     if best.stability is not None and best.stability.margins is not None and not best.serves:
         margins = f"disk margin of {best.stability.margins.disk:.3g} is below the least, {answer.search.least_margin:g}"
-        return f"The answer {_all(answer)}{(cases := _cases(answer)) and f' in {cases}'}, but its {margins}"
-    text = f"The answer {_all(answer)}{(cases := _cases(answer)) and f' in {cases}'}"
+        return f"{text}, but its {margins}"
     for confirmation in answer.search.confirmation:
-        text += (
-            ""
-            if confirmation.withstood
-            else (
-                f", but not in {confirmation.failed + confirmation.missed:,} of {confirmation.cases:,}"
-                f" of {confirmation.against}"
-            )
-        )
+        if not confirmation.withstood:
+            misses = confirmation.failed + confirmation.missed
+            text += f", but not in {misses:,} of {confirmation.cases:,} of {confirmation.against}"
     return text
 
 

@@ -260,7 +260,7 @@ class BestAnswer:
         return [f"{head}{left}", *self.table([BestRow(int(design), "") for design in some])]
 
     def table(self, rows: Sequence[BestRow]) -> list[str]:
-        """Designs as lines."""
+        """The table of some designs, as lines for the terminal."""
         lines = self.cells(rows)
         if any(int(self.designs.cases[row.design]) > 1 for row in rows):
             lines[1][0] = "in the worst case:"

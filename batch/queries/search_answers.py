@@ -61,7 +61,7 @@ class SearchAnswer:
 
     @cached_property
     def best(self) -> Answer:
-        """The best of its cases."""
+        """The best of the search's cases, or of a tuning's candidates."""
         return answer(self.search, *self._judged_cases)
 
     @cached_property
@@ -395,7 +395,7 @@ def progress(answer_so_far: Answer, experiment: Experiment) -> str:
 
 
 def _binding(best: Answer) -> str:
-    """What the best candidate misses, or is nearest to missing, in words."""
+    """The end of a progress line: the requirement that the best candidate misses, or is nearest to missing."""
     if best.missed:
         return f", misses {best.missed[0]}"
     near: Sequence[str] = [room.text for room in best.rooms[:NEAREST] if best.search.kind == "tune"]

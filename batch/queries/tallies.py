@@ -73,15 +73,15 @@ class RequiredOfCases(Protocol):
 
     @property
     def metric(self) -> str:
-        """The name of its metric."""
+        """The name of the metric that is judged."""
 
     @property
     def comparison(self) -> str:
-        """`<`, `<=`, `>` or `>=`."""
+        """The comparison of the metric with the limit: `<`, `<=`, `>` or `>=`."""
 
     @property
     def limit(self) -> float:
-        """The limit, SI."""
+        """The limit of the metric, in SI."""
 
     @property
     def share(self) -> float | None:
@@ -172,6 +172,7 @@ class CaseTallies:
     def __init__(
         self, metrics: Sequence[str], requirements: Sequence[RequiredOfCases], sizes: Sequence[int] | np.ndarray
     ) -> None:
+        """Begin with no case. Of a requirement over a share of cases each design point has a tally of its own."""
         self._requirements = tuple(requirements)
         self.metrics = {name: MetricTally() for name in metrics}
         self._everywhere = [Judged(requirement, 0) for requirement in requirements]
