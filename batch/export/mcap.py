@@ -212,7 +212,7 @@ def _messages(channels: Channels, arms: Sequence[PosedArm], number: int) -> Iter
 def _stream(channels: Channels, arm: PosedArm, name: str, columns: Sequence[SignalColumn]) -> SignalStream:
     """The channel and the values [row, column] of a signal that an MCAP file gets."""
     values = arm.case.signal(name)[:, [column.place for column in columns]]
-    parts = topics.fields(columns)
+    parts = wire.tree([column.parts or ("value",) for column in columns])
     units = {".".join(column.parts or ("value",)): column.unit for column in columns}
     same_unit = len(set(units.values())) == 1
     metadata = {"unit": columns[0].unit} if same_unit else {f"unit.{path}": unit for path, unit in units.items()}

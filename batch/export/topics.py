@@ -1,11 +1,10 @@
-"""The names of an MCAP file's topics, of the fields of their messages, and of the root frame."""
+"""The names of an MCAP file's topics and of its root frame, and the signals that have a topic."""
 
 from __future__ import annotations
 
 import itertools
 from collections.abc import Sequence
 
-from batch.export import wire
 from batch.export.picking import ExportedCase, SignalColumn
 from batch.export.poses import PosedArm
 
@@ -20,11 +19,6 @@ def root(arms: Sequence[PosedArm]) -> str:
 def topic(arm: PosedArm, name: str) -> str:
     """The topic of a signal, where dots would be taken for fields: `/case7/elbow/servo/voltage`."""
     return f"/{arm.prefix}{name.replace('.', '/')}"
-
-
-def fields(columns: Sequence[SignalColumn]) -> tuple[wire.MessageField, ...]:
-    """The fields of a signal's messages: joints, components, or `value`."""
-    return wire.tree([column.parts or ("value",) for column in columns])
 
 
 def signals(case: ExportedCase) -> dict[str, list[SignalColumn]]:

@@ -98,10 +98,9 @@ def _judged_at_a_limit(group: ArchiveGroup, experiment: Experiment | None) -> Di
     if len(judged) > 1:
         others = ", ".join(f"`require {other.text}`" for other, _, _ in judged if other is not required)
         helps.append(f"the same of {others}")
-    place = None if experiment is None else experiment.requirements[required.place].place
     set_at = place_of_parameter(experiment, path)
     also = () if set_at is None else (Label(set_at, "the limit"),)
-    return warning("D344", message, place, also=also, help=helps)
+    return warning("D344", message, required.written_at(experiment), also=also, help=helps)
 
 
 def _passed(group: ArchiveGroup, experiment: Experiment | None) -> Diagnostic | None:

@@ -16,13 +16,10 @@ from batch.archive.read import ArchiveGroup
 from batch.queries.evidence import EvidenceRow, Verdict, evidence_for, percent_above, percent_below
 from batch.queries.requirements import group_requirements
 from batch.queries.signals import deck_unit, number_text, pretty_unit
-from batch.queries.step_errors.figures import StepErrorVerdict, figures, rounded, verdicts
+from batch.queries.step_errors.figures import NONE, StepErrorVerdict, figures, rounded, verdicts
 from batch.queries.tallies import summed_up
 from met.frozen import frozen
 from met.outputs import quoted
-
-NONE = "-"
-"""Text in place of a missing value."""
 
 
 @frozen(kw_only=True)

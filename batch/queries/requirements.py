@@ -8,8 +8,10 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from batch.archive.read import ArchiveGroup
+from met.diagnostic import Place
 from met.distinct import distinct
 from met.frozen import frozen
+from met.plan import Experiment
 from met.run import DONE
 
 
@@ -34,6 +36,10 @@ class GroupRequirement:
     def margin(self, value: float) -> float:
         """The distance from a value of the metric to the limit, SI; negative where the value is beyond it."""
         return (1.0 if self.below else -1.0) * (self.limit - value)
+
+    def written_at(self, experiment: Experiment | None) -> Place | None:
+        """The place of the requirement in the deck, from the plan of its experiment; None without that."""
+        return None if experiment is None else experiment.requirements[self.place].place
 
 
 def requirement_texts(group: ArchiveGroup) -> list[str]:

@@ -208,13 +208,9 @@ def case_text(group: ArchiveGroup, position: int, *, varied: bool = True) -> str
         for path, (value, unit) in (group.coordinates_of(position).items() if varied else ())
     ]
     chosen = [f"{v.path} = {group.at(v.name, [position])[0]}" for v in (group.role("choice") if varied else ())]
-    return " · ".join([f"case #{row} {case_id[:8]}", *chosen, *words, *repeat_text(group, position)])
-
-
-def repeat_text(group: ArchiveGroup, position: int) -> list[str]:
-    """The repeat of a case in words, where cases are repeated."""
     repeats = group.values("repeat") if "repeat" in group.variables else np.zeros(0)
-    return [f"repeat {int(repeats[position])}"] if repeats.any() else []
+    repeat = [f"repeat {int(repeats[position])}"] if repeats.any() else []
+    return " · ".join([f"case #{row} {case_id[:8]}", *chosen, *words, *repeat])
 
 
 MOTION = re.compile(r"initial\.|metrics\.|guides?\.|environment\.|(.*\.)?servo\.command\.")

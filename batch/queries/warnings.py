@@ -148,8 +148,7 @@ def _diagnostics(
     """One warning (D341) about a requirement, with the others that it is true of."""
     if others:
         helps.append(f"the same of {', '.join(f'`require {other.text}`' for other in others)}")
-    place = None if experiment is None else experiment.requirements[first.place].place
-    return [warning("D341", message, place, help=helps)]
+    return [warning("D341", message, first.written_at(experiment), help=helps)]
 
 
 def _is_time(model: str) -> bool:

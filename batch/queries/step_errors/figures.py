@@ -261,7 +261,7 @@ def _size(case: CaseError, share: bool) -> float:
 HINT = "not verified: `--verify some` runs some cases at half and a quarter of the step"
 
 NONE = "-"
-"""Text in place of an unknown error."""
+"""Text in place of an error, or another number, that is not known."""
 
 
 def error_text(metric_error: MetricError | None, scale: float = 1.0) -> str:

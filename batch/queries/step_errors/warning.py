@@ -69,9 +69,8 @@ def _undecided(
     ]
     if len(those) > 1:
         helps.append(f"so it is in {len(those):,} of the {verification.cases:,} verified cases")
-    place = None if experiment is None else experiment.requirements[required.place].place
-    where = f"`{required.metric}` of case #{case.case} is {text}"
-    return warning("D310", f"the step decides whether `{required.text}` is met: {where}", place, help=helps)
+    message = f"the step decides whether `{required.text}` is met: `{required.metric}` of case #{case.case} is {text}"
+    return warning("D310", message, required.written_at(experiment), help=helps)
 
 
 def _turned(case: CaseError, required: GroupRequirement) -> str:
