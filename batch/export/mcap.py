@@ -31,7 +31,7 @@ from batch.export.case_log import LogLine, log_lines, result, varied
 from batch.export.formats import ExportFormat, ExportRequest, WrittenExport
 from batch.export.output import check, whole
 from batch.export.picking import ExportedCase, SignalColumn
-from batch.export.poses import PosedArm, arm_of
+from batch.export.poses import PosedArm, arm_of, lacking_text
 from batch.export.wire import plain
 from met.diagnostic import Diagnostic, Problem, error
 from met.frozen import frozen
@@ -283,9 +283,9 @@ def _check_positions(campaign: Campaign, target: Path) -> None:
     for part in campaign.parts:
         structure = part.experiment.structure
         recorded = {channel for recording in structure.record for channel in recording.channels}
-        lacking = [f"{joint.name}.q" for joint in structure.moving if f"{joint.name}.q" not in recorded]
+        lacking = [joint.name for joint in structure.moving if f"{joint.name}.q" not in recorded]
         if part.recorded and lacking:
-            which = "q" if len(lacking) == len(structure.moving) else ", ".join(lacking)
+            which = lacking_text(lacking, structure.moving)
             message = (
                 f"the arm of `{part.experiment.name_in_deck}` could not be shown in {target}: {which} is not recorded"
             )

@@ -112,8 +112,7 @@ def positions(case: ExportedCase, joints: Sequence[str], *, free: bool = False) 
     missing = [joint for joint, q in q_of_joint.items() if q is None]
     of_base = [name for name in OF_FREE_BASE if free and name not in signals]
     if missing or of_base:
-        every = missing and len(missing) == len(joints)
-        which = ", ".join([*(["q"] if every else [f"{joint}.q" for joint in missing]), *of_base])
+        which = lacking_text(missing, joints, of_base)
         message = f"the arm of case #{case.number} of `{case.run_name}` cannot be shown: {which} was not recorded"
         helps = (
             lacking_help(free=bool(of_base)),
@@ -131,6 +130,13 @@ def _position(case: ExportedCase, joint: str, signals: Mapping[str, Stored]) -> 
     if POSITION in signals and joint in (joints := case.group.joints(signals[POSITION])):
         return case.signal(POSITION)[:, joints.index(joint)].astype(np.float64)
     return None
+
+
+def lacking_text(lacking: Sequence[str], joints: Sequence[object], of_base: Sequence[str] = ()) -> str:
+    """The signals without which an arm cannot be placed: `q` where all its joints lack it, else `elbow.q` for each that
+    does; and those of its base."""
+    all_lack = lacking and len(lacking) == len(joints)
+    return ", ".join([*([POSITION] if all_lack else [f"{joint}.{POSITION}" for joint in lacking]), *of_base])
 
 
 def lacking_help(*, free: bool) -> str:

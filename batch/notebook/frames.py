@@ -11,7 +11,7 @@ import xarray
 
 from batch.archive.read import ArchiveGroup
 from batch.arms.scene import OF_FREE_BASE, POSITION, free_pose, parameters, prescribed_pose, world_poses
-from batch.export.poses import lacking_help, pose_variables
+from batch.export.poses import lacking_help, lacking_text, pose_variables
 from batch.notebook.quantities import number
 from batch.notebook.table import CASE, NO_HISTORIES, RECORDED, experiment, path_of, places, run_name, unknown_name
 from met.diagnostic import Problem, error
@@ -111,8 +111,7 @@ def _positions(data: xarray.Dataset, own: Experiment) -> tuple[xarray.DataArray,
     lacking = [joint for joint, q in q_of_joint.items() if q is None]
     of_base = [name for name in OF_FREE_BASE if own.structure.free and name not in data]
     if lacking or of_base:
-        every = lacking and len(lacking) == len(q_of_joint)
-        which = ", ".join([*([POSITION] if every else [f"{joint}.{POSITION}" for joint in lacking]), *of_base])
+        which = lacking_text(lacking, list(q_of_joint), of_base)
         message = f"the links of `{run_name(data)}` cannot be placed: {which} is not in this Dataset"
         recorded = {channel for recording in own.structure.record for channel in recording.channels}
         helps = lacking_help(free=bool(of_base))

@@ -16,7 +16,7 @@ import numpy as np
 from batch.queries import requirements
 from batch.queries.evidence import ROUNDING
 from batch.queries.expressions import CaseExpressions
-from batch.queries.grids import levels
+from batch.queries.grids import FULL, levels
 from batch.queries.pool import CaseColumn, Pool
 from met.diagnostic import Problem, did_you_mean, error
 from met.distinct import distinct
@@ -30,9 +30,6 @@ MOST_CELLS = 1 << 26
 
 BORNE = ("links.", "payloads.", "environment.", "initial.")
 """Prefixes of the paths of loads that servos must withstand, and a tuner does not choose, unless the user says so."""
-
-FULL = 0.5
-"""Smallest share of its cells in which a grid must have designs."""
 
 ENDS, FAILS, UNKNOWN = "the sweep ends", "a case fails", "it was not run"
 

@@ -18,7 +18,7 @@ MOST_LEVELS = 48
 """Largest number of rows and columns of a map; more values share them, in stretches."""
 
 FULL = 0.5
-"""Smallest share of its cells in which a grid has cases: two parameters in step make no grid."""
+"""Smallest share of its cells in which a grid has cases, or designs: two parameters in step make no grid."""
 
 
 Scale = Literal["linear", "log", "place"]

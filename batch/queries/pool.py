@@ -355,9 +355,8 @@ def failure_lines(failure_groups: Sequence[FailureGroup], width: int) -> Iterato
         yield from textwrap.wrap(
             f"{cause} (#{failure.row})", width, initial_indent=head, subsequent_indent=" " * len(head)
         )
-        if failure.of:
-            continue
-        yield from textwrap.wrap(ranges(failure.cases), width, initial_indent="    ", subsequent_indent="    ")
+        if not failure.of:
+            yield from textwrap.wrap(ranges(failure.cases), width, initial_indent="    ", subsequent_indent="    ")
 
 
 def ranges(cases: Sequence[int]) -> str:
