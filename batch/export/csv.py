@@ -86,14 +86,8 @@ def _line(cells: Sequence[object]) -> list[str]:
 
 def _cells(case: ExportedCase, columns: Sequence[SignalColumn]) -> list[list[str]]:
     """The numbers of each column as texts; empty ones where the case lacks the column."""
-    mine = {column.path: column for column in case.columns}
-    signals = {name: case.signal(name) for name in dict.fromkeys(column.variable for column in case.columns)}
-    return [
-        number_texts(signals[mine[column.path].variable][:, mine[column.path].place])
-        if column.path in mine
-        else [""] * len(case.time)
-        for column in columns
-    ]
+    values, empty = case.values(), [""] * len(case.time)
+    return [number_texts(values[column.path]) if column.path in values else empty for column in columns]
 
 
 def number_texts(values: np.ndarray) -> list[str]:

@@ -96,9 +96,7 @@ def _table(arrow: Any, schema: Any, case: ExportedCase, fields: Sequence[TableCo
     rows = len(case.time)
     alike: dict[str, Any] = {"run": case.run_name, "case": case.number}
     alike |= {field.name: value_of(field, case.group, case.position) for field in fields}
-    arrays: dict[str, Any] = {"time": case.time}
-    signals = {name: case.signal(name) for name in dict.fromkeys(column.variable for column in case.columns)}
-    arrays |= {column.path: signals[column.variable][:, column.place] for column in case.columns}
+    arrays: dict[str, Any] = {"time": case.time, **case.values()}
     arrays_ = []
     for field in schema:
         if field.name in arrays:

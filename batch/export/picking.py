@@ -58,6 +58,11 @@ class ExportedCase:
         values = self.group.signal(variable, self.position)[: len(self.time)]
         return values.reshape(len(values), math.prod(values.shape[1:]))
 
+    def values(self) -> dict[str, np.ndarray]:
+        """The numbers of each column, [row], by the column's path."""
+        signals = {name: self.signal(name) for name in dict.fromkeys(column.variable for column in self.columns)}
+        return {column.path: signals[column.variable][:, column.place] for column in self.columns}
+
 
 def pick(file: ArchiveFile, runs: Sequence[str], cases: Sequence[str], signals: Sequence[str]) -> list[ExportedCase]:
     """The cases of these runs and sweeps (none: of the first), in the given order (none: all that have histories, by
