@@ -25,8 +25,7 @@ def as_data(differences: Diff) -> dict[str, Any]:
         "only_b": list(differences.only_b),
         "experiments": [_experiment(experiment) for experiment in differences.experiments],
     }
-    plain: dict[str, Any] = finite(data)
-    return plain
+    return dict(finite(data))
 
 
 def _experiment(experiment: ExperimentDiff) -> dict[str, Any]:

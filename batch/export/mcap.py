@@ -256,9 +256,9 @@ def _log(case: ExportedCase, arm: PosedArm, line: LogLine) -> bytes:
 
     name = arm.prefix.rstrip("/") or case.run_name
     level = Log.Level.Value(line.level)
-    text = Log(timestamp=_stamp(_ns(line.time)), level=level, message=plain(line.text), name=name)
-    data: bytes = text.SerializeToString()
-    return data
+    return bytes(
+        Log(timestamp=_stamp(_ns(line.time)), level=level, message=plain(line.text), name=name).SerializeToString()
+    )
 
 
 def nanoseconds(seconds: np.ndarray) -> list[int]:

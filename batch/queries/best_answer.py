@@ -365,7 +365,7 @@ class BestAnswer:
         """The answer for programs: SI, null for non-finite numbers."""
         designs = self.designs
         rows = self.rows() if self.best is not None else []
-        data: dict[str, Any] = {
+        data = {
             "experiment": designs.pool.name,
             "designs": designs.count,
             "good": int(designs.good.sum()),
@@ -377,8 +377,7 @@ class BestAnswer:
             "front": [self._as_row(BestRow(int(i), "")) for i in designs.front(self.front)] if self.front else [],
             "command": "" if self.best is None else self.command(self.best),
         }
-        out: dict[str, Any] = finite(data)
-        return out
+        return dict(finite(data))
 
     def _as_row(self, row: BestRow) -> dict[str, Any]:
         """A row of the answer for JSON: the design's chosen values, its worst metrics, room to limits, and

@@ -140,7 +140,7 @@ def _of_summary(
 ) -> Iterator[EvidenceRow]:
     """The rows of requirements on all cases, from the summary that the archive keeps."""
     chosen = [group.variables[str(name)] for name in summary.values["chosen"]]
-    why = _why_without_confidence(group, group.role("coordinate"))
+    why = _why_without_confidence(group)
     for requirement in judged_requirements:
         scale, unit = deck_unit(group.variables[requirement.metric])
         for row in summary.judged(requirement.place, whole=requirement.share is None):
@@ -183,30 +183,26 @@ def _design_points(group: ArchiveGroup) -> tuple[list[DesignPoint], str]:
 
     Where nothing was drawn there is one design point of all cases.
     """
-    everything = [DesignPoint({}, np.arange(group.count))]
-    coordinates = group.role("coordinate")
-    drawn = [variable for variable in coordinates if variable.attributes.get("design")]
-    why = _why_without_confidence(group, coordinates)
-    if why == NOTHING_DRAWN:
-        return everything, why
-    chosen = [(variable, group.values(variable.name)) for variable in coordinates if variable not in drawn]
-    if not chosen:
-        return everything, why
-    points = design_points([values for _, values in chosen], group.count)
+    chosen = [variable for variable in group.role("coordinate") if not variable.attributes.get("design")]
+    why = _why_without_confidence(group)
+    if why == NOTHING_DRAWN or not chosen:
+        return [DesignPoint({}, np.arange(group.count))], why
+    with_values = [(variable, group.values(variable.name)) for variable in chosen]
+    points = design_points([values for _, values in with_values], group.count)
     cases = np.split(np.argsort(points, kind="stable"), np.cumsum(np.bincount(points))[:-1])
     return [
-        DesignPoint({v.path: _value_text(v, values[case_places[0]]) for v, values in chosen}, case_places)
+        DesignPoint({v.path: _value_text(v, values[case_places[0]]) for v, values in with_values}, case_places)
         for case_places in cases
     ], why
 
 
-def _why_without_confidence(group: ArchiveGroup, coordinates: Sequence[Stored]) -> str:
+def _why_without_confidence(group: ArchiveGroup) -> str:
     """The reason why the cases of a group give no confidence; "" where they do."""
     if (summed := summed_up(group)) is not None:
         drawn = summed.drawn
     else:
-        drawn = any(variable.attributes.get("design") for variable in coordinates)
-        drawn = drawn or int(group.values("repeat").max(initial=0)) > 0
+        designed = any(variable.attributes.get("design") for variable in group.role("coordinate"))
+        drawn = designed or int(group.values("repeat").max(initial=0)) > 0
     if not drawn:
         return NOTHING_DRAWN
     some = group.run < int(group.attributes.get("cases_in_table", group.run))

@@ -363,8 +363,8 @@ def as_json(summary: Summary) -> dict[str, Any]:
         for step_error in summary.step_errors
     ]
     judged = {"verified": figures.as_json(summary.verified), "step_errors": limits, "warnings": warned}
-    data: dict[str, Any] = finite({**plain, "metrics": [_named_first(asdict(m)) for m in summary.metrics], **judged})
-    return {**data, "ok": summary.ok}
+    metrics = [_named_first(asdict(metric)) for metric in summary.metrics]
+    return {**finite({**plain, "metrics": metrics, **judged}), "ok": summary.ok}
 
 
 def _named_first(metric: dict[str, Any]) -> dict[str, Any]:
