@@ -117,9 +117,7 @@ def _about(writer: Writer, file: ArchiveFile, arms: Sequence[PosedArm]) -> None:
     writer.add_metadata(ABOUT, {plain(name): plain(value) for name, value in about.items()})
     for arm in arms:
         case, group = arm.case, arm.case.group
-        keys = {
-            name: str(group.at(name, [case.position])[0]) for name in ("case_id", "case_key") if name in group.variables
-        }
+        keys = {name: str(case.value(name)) for name in ("case_id", "case_key") if name in group.variables}
         data = {
             "prefix": arm.prefix,
             "run": case.run_name,

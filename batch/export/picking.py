@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
@@ -52,6 +53,10 @@ class ExportedCase:
     def run_name(self) -> str:
         """The run or sweep that it is of."""
         return self.group.sweep or self.group.name
+
+    def value(self, name: str) -> Any:
+        """The value of a variable of which each case has one, such as `status` or a metric."""
+        return self.group.at(name, [self.position])[0]
 
     def signal(self, variable: str) -> np.ndarray:
         """A signal's numbers, (row, place), in the archive's order."""

@@ -67,7 +67,7 @@ def arm_of(plan: Plan, case: ExportedCase, prefix: str) -> PosedArm:
         experiment = next((experiment for experiment in plan.experiments if experiment.name == group.name), None)
         if experiment is None:
             raise LookupError(group.name)
-        varied = {v.path: group.at(v.name, [case.position])[0] for v in group.role("coordinate")}
+        varied = {v.path: case.value(v.name) for v in group.role("coordinate")}
         values = parameters(experiment, varied)
         first = parameters(
             experiment, {coordinate.path: coordinate.values[0] for coordinate in experiment.cases.coordinates}

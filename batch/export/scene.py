@@ -76,8 +76,8 @@ def scene(arm: PosedArm, root: str, ghost: bool, size: float) -> Any:
 
 
 def _numbers(arm: PosedArm, size: float) -> ArmNumbers:
-    group = arm.case.group
-    varied = {v.path: float(group.at(v.name, [arm.case.position])[0]) for v in group.role("coordinate")}
+    case = arm.case
+    varied = {v.path: float(case.value(v.name)) for v in case.group.role("coordinate")}
     return ArmNumbers(arm.experiment, arm.values, varied, arm.first, arm.travel, size)
 
 
