@@ -9,8 +9,8 @@ import json
 from collections.abc import Sequence
 from typing import Any
 
-from batch.export import scene, topics
-from batch.export.poses import PosedArm
+from batch.export import scene
+from batch.export.poses import PosedArm, root_frame
 from batch.plotting.layout import COLOURS
 from batch.queries.signals import pretty_unit
 
@@ -30,7 +30,7 @@ DISTANCE, GRID, AXES = 2.6, 4.0, 0.08
 
 def text(arms: Sequence[PosedArm]) -> str:
     """The layout of an export of these arms."""
-    known = topics.signals(arms[0].case)
+    known = arms[0].case.signals
     signals = [name for name in PLOTTED if name in known] or list(known)[: len(PLOTTED)]
     panels: dict[str, Any] = {"3D!arm": _view(arms)}
     panels |= {f"Plot!{name}": _plot(arms, name) for name in signals}
@@ -48,7 +48,7 @@ def text(arms: Sequence[PosedArm]) -> str:
 
 def _view(arms: Sequence[PosedArm]) -> dict[str, Any]:
     """The 3D panel: the whole arm from obliquely above, on a grid."""
-    base, size = topics.root(arms), scene.size(arms)
+    base, size = root_frame(arms), scene.size(arms)
     return {
         "cameraState": {
             "distance": DISTANCE * size,
@@ -66,7 +66,7 @@ def _view(arms: Sequence[PosedArm]) -> dict[str, Any]:
         "followTf": base,
         "scene": {"transforms": {"showLabel": False, "axisScale": AXES * size, "lineWidth": 0}},
         "transforms": {},
-        "topics": {topics.topic(arm, "scene"): {"visible": True} for arm in arms},
+        "topics": {arm.topic("scene"): {"visible": True} for arm in arms},
         "layers": {
             "grid": {
                 "layerId": "foxglove.Grid",
@@ -92,11 +92,11 @@ def _plot(arms: Sequence[PosedArm], signal: str) -> dict[str, Any]:
     """The panel of a signal over time: a line for each joint or component, in each case."""
     paths, units = [], []
     for number, arm in enumerate(arms):
-        for place, column in enumerate(topics.signals(arm.case).get(signal, [])):
+        for place, column in enumerate(arm.case.signals.get(signal, [])):
             colour = LINKS[place % len(LINKS)] + (GHOST if number else "")
             field = ".".join(column.parts or ("value",))
             label = f"{arm.prefix.replace('/', ' ')}{'.'.join(column.parts)}".strip() or signal
-            value = f"{topics.topic(arm, signal)}.{field}"
+            value = f"{arm.topic(signal)}.{field}"
             paths.append(
                 {"value": value, "label": label, "color": colour, "enabled": True, "timestampMethod": "receiveTime"}
             )

@@ -26,12 +26,12 @@ import numpy as np
 from batch.archive.read import ArchiveFile
 from batch.arms.meshes import arm_meshes
 from batch.campaigns.campaign import Campaign
-from batch.export import layout, scene, topics, wire
+from batch.export import layout, scene, wire
 from batch.export.case_log import LogLine, log_lines, result, varied
 from batch.export.formats import ExportFormat, ExportRequest, WrittenExport
 from batch.export.output import check, whole
 from batch.export.picking import ExportedCase, SignalColumn
-from batch.export.poses import PosedArm, arm_of, lacking_text
+from batch.export.poses import PosedArm, arm_of, lacking_text, root_frame
 from batch.export.wire import plain
 from met.diagnostic import Diagnostic, Problem, error
 from met.frozen import frozen
@@ -110,7 +110,7 @@ def _about(writer: Writer, file: ArchiveFile, arms: Sequence[PosedArm]) -> None:
         "archive": file.path.name,
         "deck": file.deck,
         "arm": arms[0].experiment.structure.arm,
-        "base_frame": topics.root(arms),
+        "base_frame": root_frame(arms),
         "met": VERSION,
         **{name: str(value) for name, value in file.provenance.items()},
     }
@@ -181,12 +181,12 @@ def _messages(channels: Channels, arms: Sequence[PosedArm], number: int) -> Iter
     from foxglove_schemas_protobuf.Log_pb2 import Log
     from foxglove_schemas_protobuf.SceneUpdate_pb2 import SceneUpdate
 
-    arm, base = arms[number], topics.root(arms)
+    arm, base = arms[number], root_frame(arms)
     case = arm.case
-    frames = channels.foxglove(topics.topic(arm, "tf"), FrameTransforms)
-    drawn = channels.foxglove(topics.topic(arm, "scene"), SceneUpdate)
+    frames = channels.foxglove(arm.topic("tf"), FrameTransforms)
+    drawn = channels.foxglove(arm.topic("scene"), SceneUpdate)
     log = channels.foxglove("/log", Log)
-    streams = [_stream(channels, arm, name, columns) for name, columns in topics.signals(case).items()]
+    streams = [_stream(channels, arm, name, columns) for name, columns in case.signals.items()]
     lines = log_lines(case)
     update = scene.scene(arm, base, number > 0, scene.size(arms))
     yield 0, number, drawn, update.SerializeToString(deterministic=True)
@@ -203,7 +203,7 @@ def _messages(channels: Channels, arms: Sequence[PosedArm], number: int) -> Iter
     parts, data = result(case)
     units = {v.name.rpartition(".")[2]: v.unit for v in case.group.role("metric")}
     metadata = {f"unit.{name}": unit for name, unit in units.items()}
-    channel = channels.own(topics.topic(arm, "result"), "result", parts, metadata)
+    channel = channels.own(arm.topic("result"), "result", parts, metadata)
     yield _ns(lines[-1].time), number, channel, wire.message(parts, data)
 
 
@@ -214,9 +214,7 @@ def _stream(channels: Channels, arm: PosedArm, name: str, columns: Sequence[Sign
     units = {".".join(column.parts or ("value",)): column.unit for column in columns}
     same_unit = len(set(units.values())) == 1
     metadata = {"unit": columns[0].unit} if same_unit else {f"unit.{path}": unit for path, unit in units.items()}
-    channel = channels.own(
-        topics.topic(arm, name), name.replace(".", "_"), parts, {**metadata, "about": columns[0].about}
-    )
+    channel = channels.own(arm.topic(name), name.replace(".", "_"), parts, {**metadata, "about": columns[0].about})
     return SignalStream(channel, parts, values)
 
 

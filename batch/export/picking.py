@@ -54,6 +54,14 @@ class ExportedCase:
         """The run or sweep that it is of."""
         return self.group.sweep or self.group.name
 
+    @property
+    def signals(self) -> dict[str, list[SignalColumn]]:
+        """The columns of each signal, by its name."""
+        out: dict[str, list[SignalColumn]] = {}
+        for column in self.columns:
+            out.setdefault(column.variable, []).append(column)
+        return out
+
     def value(self, name: str) -> Any:
         """The value of a variable of which each case has one, such as `status` or a metric."""
         return self.group.at(name, [self.position])[0]

@@ -5,6 +5,7 @@ So it is with a base that is prescribed; of a free one position and orientation 
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -49,6 +50,17 @@ class PosedArm:
     place: Mapping[str, np.ndarray]
     travel: Mapping[str, tuple[float, float]]
     meshes: ArmMeshes = NO_MESHES
+
+    def topic(self, name: str) -> str:
+        """The topic of a signal in an MCAP file, where dots would be taken for fields: `/case7/elbow/servo/voltage`."""
+        return f"/{self.prefix}{name.replace('.', '/')}"
+
+
+def root_frame(arms: Sequence[PosedArm]) -> str:
+    """The name of the frame that all arms of an MCAP file stand in: the first of these names that no link has."""
+    taken = {arm.prefix + name for arm in arms for name in arm.poses}
+    names = itertools.chain(("world", "base", "ground"), (f"world_{number}" for number in itertools.count(2)))
+    return next(name for name in names if name not in taken)
 
 
 @frozen
