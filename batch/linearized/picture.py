@@ -201,16 +201,18 @@ def locus_figure(question: LinearQuestion, answers: Sequence[Linearized | str]) 
     from matplotlib.figure import Figure
 
     answered = {case: answer for case, answer in enumerate(answers) if isinstance(answer, Linearized)}
-    if not answered:
-        raise Problem(
-            error("E450", "there is nothing to draw: no case has an answer", help="`--at` asks at another instant")
-        )
+    if not any(answer.poles for answer in answered.values()):
+        reason, help = "no case has an answer", "`--at` asks at another instant"
+        if answered:
+            reason, help = "no case has a pole, for nothing moves", "a joint that is locked or prescribed has none"
+        raise Problem(error("E450", f"there is nothing to draw: {reason}", help=help))
     values, label = _coordinate(question)
     norm = Normalize(float(np.min(values)), float(np.max(values)))
     picture = Figure(figsize=(9.4, 4.9), dpi=144, layout="constrained")
     z_plane, s_plane = picture.subplots(1, 2)
     for case in answered:
-        poles = np.array([(pole.z, pole.s / (2.0 * math.pi)) for pole in answered[case].poles])
+        places_of_poles = [(pole.z, pole.s / (2.0 * math.pi)) for pole in answered[case].poles]
+        poles = np.array(places_of_poles, complex).reshape(-1, 2)  # also of a case without states
         colour = ScalarMappable(norm, MAP).to_rgba(values[case])
         for axes, points in ((z_plane, poles[:, 0]), (s_plane, poles[np.isfinite(poles[:, 1].real), 1])):
             axes.plot(points.real, points.imag, ".", color=colour, markersize=4)

@@ -131,6 +131,29 @@ def test_a_picture_of_all_cases_is_a_root_locus(folder: Path) -> None:
     assert (folder / "locus.svg").read_text(encoding="utf-8").count("<svg") == 1
 
 
+@pytest.mark.slow
+def test_of_an_arm_that_does_not_move_there_is_no_root_locus() -> None:
+    question = LinearQuestion(ic.compile(text=STILL, select=["heavier"]).experiments[0], 0.0, (), (), ())
+    with pytest.raises(Problem, match="E450") as refused:
+        picture.locus_figure(question, answered(question))
+    assert refused.value.diagnostics[0].message == "there is nothing to draw: no case has a pole, for nothing moves"
+
+
+STILL = """\
+arm bar {
+    link one { mass = 1 kg;  shape = rod(length = 1 m, along = x); }
+    joint hinge revolute { parent = base;  child = one;  axis = z; }
+}
+servo fixed { model = locked; }
+run hold {
+    arm = bar;  servos { hinge = fixed; }
+    rates { dynamics = 1 kHz;  record = 100 Hz; }
+    duration = 0.1 s;  record = [q];
+}
+sweep heavier of hold { vary links.one.mass = [1, 2] kg; }
+"""
+
+
 def test_a_file_is_of_one_case(folder: Path) -> None:
     said = CliRunner().invoke(linear, [str(folder / "deck.ic"), "--all-cases", "-o", "a.npz"])
     assert said.exit_code == 2 and "-o is of one case, and --all-cases of all" in said.output
