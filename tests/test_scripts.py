@@ -375,8 +375,9 @@ def test_scripts_test_adds_what_it_needs_and_ends_with_the_summary_of_pytest(che
     for lock, names in zip(LOCKS, (TO_START, TO_TEST, TO_TEST | {"mpmath"}), strict=True):
         shorten(checkout, lock, names)
     settings = (checkout / "setup.cfg").read_text()
-    assert settings.count("packages = met, ic, batch, hw\n") == 1
-    (checkout / "setup.cfg").write_text(settings.replace("packages = met, ic, batch, hw\n", "packages = met.version\n"))
+    checked = "packages = met, ic, batch, hw, tests.hw.players\n"
+    assert settings.count(checked) == 1
+    (checkout / "setup.cfg").write_text(settings.replace(checked, "packages = met.version\n"))
     (checkout / "tests").mkdir()
     for name in ("conftest.py", "costs.py", "costs.toml"):
         shutil.copy(ROOT / "tests" / name, checkout / "tests")
