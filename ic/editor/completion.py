@@ -483,5 +483,7 @@ def _parameters(name: str, entry: str) -> tuple[Parameter, ...]:
     metric = models.available("metric").get(name)
     if metric is not None and entry == "metric":
         return (WATCHES, *models.written(metric))
+    if metric is not None and entry != "require" and entry not in GOALS:
+        return ()
     called = [models.written(model) for model in models_called(name).values()]
     return called[0] if called else ()
