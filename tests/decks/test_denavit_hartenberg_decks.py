@@ -86,6 +86,7 @@ def test_the_standard_decks_can_be_included_together(tmp_path: Path) -> None:
         "panda",
         "puma_560",
         "shuttle_arm",
+        "shuttle_booms",
         "stanford_arm",
         "station_arm",
         "two_link",

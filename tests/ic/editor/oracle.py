@@ -113,7 +113,9 @@ class Oracle:
         return next((each for each in self.experiments if each.name == name), None)
 
     def _named(self, kind: str) -> set[str]:
-        return set(self.definitions.of_kind(kind))
+        """The names of a kind, and what those of a deck that is used begin with: `rigid` of `rigid.shuttle_arm`."""
+        names = self.definitions.of_kind(kind)
+        return {*names, *(name.partition(".")[0] for name in names)}
 
     def _place_of(self, kind: str, name: str) -> set[At] | None:
         found = self.definitions.of_kind(kind).get(name)
@@ -210,7 +212,8 @@ class Oracle:
             if key.text == "joint" and len(entry.words) > 2:
                 kinds = {"revolute", "prismatic", "fixed"}
                 self._note(entry.words[2], "kind of joint", defined=set(), offered=kinds, only=kinds)
-        self._block(key.text, entry.body, within)
+        special = next((word.text for word in entry.words[2:3] if word.text in BLOCKS), key.text)  # `link NAME boom`
+        self._block(special, entry.body, within)
 
     def _setting(self, block: str, entry: Setting, within: tuple[str, str], model: str) -> None:
         words = entry.words
