@@ -155,9 +155,12 @@ class Folder:
     ) -> None:
         """Write the campaign's description, for workers and for later runs.
 
-        stops_early  numbers of sections of which no more cases are run than decide what is required
-        searches     of those whose cases are chosen as they go, by number, how many they are at most
-        about   `key` of the campaign, name of its `archive`, words for the `histories` that are kept
+        stops_early  numbers of sections that end as soon as it is decided whether their requirements hold
+        searches     the largest number of cases of each section whose cases are chosen as they run, by its number
+        about        `key` of the campaign, name of its `archive`, words for the `histories` that are kept
+
+        A section with another number than its experiment runs cases of it `again`, for their histories. `rows` is the
+        file with the cases of a section that does not run all.
         """
         self.shards.mkdir(exist_ok=True)
         # those that are there are ours, and may be damaged: plan_file writes over nothing but plans

@@ -294,7 +294,8 @@ class WireBed(BedDriver):
         )
 
     def _unwrapped(self, counts: int) -> int:
-        """The angle in counts since the first sample, from counts that begin anew beyond 32 bits."""
+        """The angle in counts without jumps, from counts that begin anew beyond 32 bits: the first as it is, each later
+        one the shorter way from the one before."""
         before, angle = self._angle or (counts, counts)
         angle += (counts - before + messages.MOST + 1) % (2 * messages.MOST + 2) - messages.MOST - 1
         self._angle = counts, angle

@@ -175,8 +175,10 @@ def fitted(series: Series, groups: Sequence[int], start: Mapping[str, float]) ->
 
     groups  of each move, from 0 on;  start: parameters to begin with, of `MOTOR`
 
-    A parameter that the moves do not tell keeps its start: `kt_load`, unless the drive motor's current was measured;
-    `tau_max` and `f_v`, where the drive was never at its largest torque.
+    Each group of moves is fitted by itself. The spread of their answers gives the intervals, and from their mean all
+    moves are fitted together. A parameter that the moves do not tell keeps its start: `kt_load`, unless the drive
+    motor's current was measured; `tau_max`, where the drive was hardly ever at its largest torque, and without that
+    current `f_v` too; and each whose interval is wider than `VAGUE`.
     """
     measured = series.drive_current is not None
     sought = [name for name in MOTOR if name != "kt_load" or measured]

@@ -311,8 +311,8 @@ def _with_source(place: Place, remark: str, also: tuple[Label, ...], sources: Ma
 
 def _value_words(experiment: Experiment, parameter: Quantity) -> str:
     """A parameter's value in words with its unit; of a table its range, and of one that varies its range over the
-    cases."""
-    computed = parameter.origin.kind == "derived"  # nobody writes it
+    cases. What is written in a deck is shown with all its digits."""
+    computed = parameter.origin.kind == "derived"
     match parameter.value:
         case str():
             return parameter.value

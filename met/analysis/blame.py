@@ -232,8 +232,11 @@ class Lane:
         return findings or self._too_weak(own)
 
     def _gain(self, own: _Growing, without: _Growing, joints: Sequence[str], gains: Gains) -> float | None:
-        """The share of the gains of these joints at which no more modes grow than without their loops; None where there
-        is none."""
+        """The share of these joints' gains at which fewer modes grow than now, and no more than without their loops;
+        None where there is none.
+
+        own      what grows with the loops as they are;  without: with those of these joints taken away
+        """
 
         def count(share: float) -> float:
             return self.growing({**gains, **dict.fromkeys(joints, share)}).count

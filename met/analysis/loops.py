@@ -224,9 +224,13 @@ def events(loops: SampledLoops) -> int:
 def growths(
     loops: SampledLoops, lanes: np.ndarray, gains: Gains | None = None, *, ticks: bool, direct: bool = False
 ) -> np.ndarray:
-    """Rates at which modes grow, or decay, 1/s: [lane, mode]; infinite where one is not finite.
+    """Rates at which modes grow, or decay where they are negative, 1/s: [lane, mode]; infinite where one is not finite.
 
-    ticks  of a frame; else of the arm with all laws continuous, without delays of ticks
+    lanes   the cases that are looked at, by their numbers
+    ticks   of a frame; else of the arm with all laws continuous, without delays of ticks
+    direct  see `spectrum`
+
+    Parts of the arm that are not coupled are computed one by one.
     """
     parts = uncoupled(loops)
     if len(parts) > 1:

@@ -230,7 +230,8 @@ def channels(structure: Structure, names: Iterable[str] = ()) -> dict[str, Chann
     """Every channel of the structure, by path: joint by joint, then the links', then the arm's.
 
     Jacobians, whose number is links times joints, are listed for the first link and for links that are mentioned: in
-    these names, or by the structure's own record and metrics.
+    these names, or by the structure's own record and metrics. Channels of joints, links and models of the environment
+    are all listed.
     """
     own = [*(recorded.name for recorded in structure.record), *(use.of for use in structure.metrics)]
     return _channels(structure, [*names, *own], all_owners=True)

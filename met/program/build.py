@@ -374,7 +374,7 @@ class Builder:
         return body
 
     def _expressions(self, divisor: int) -> Body:
-        """Signals that are computed from channels, as these were last sampled."""
+        """The phase that computes the deck's expressions of this rate, from parameters and channels as last sampled."""
 
         def body(tape: Tape) -> None:
             """Compute the signals of expressions that are evaluated at this rate."""

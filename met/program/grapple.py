@@ -159,7 +159,8 @@ class Grapple:
         self._keep_followers(tape)
 
     def _drive(self, tape: Tape, actuator: Actuator | None, y: Motion) -> Drive | None:
-        """The drive of a servo at the instant of a grapple; None for a joint without one."""
+        """How a servo drives its joint at the instant of a grapple, from the motion `y` and what the servo's computer
+        holds; None for a joint without a servo."""
         if actuator is None:
             return None
         held = self._held(tape, actuator)

@@ -46,7 +46,11 @@ INTEGRALS = (State(name="integral", unit="rad", doc="integral of the motor's rat
 
 
 def rate_loop(p: Any, integral: Real, setpoint: Setpoint, *, q: Real, qd: Real) -> Control:
-    """The motor's voltage. q, qd: its angle and rate over the ratio, as the loop sees them (rad, rad/s; m, m/s)."""
+    """The motor's voltage, and the rate of the loop's integral, which stands still under a command of torque and at a
+    limit of the voltage.
+
+    q, qd  angle and rate of the motor over the ratio, as the loop sees them (rad, rad/s; m, m/s)
+    """
     if setpoint.kind == "torque":
         torque_m = setpoint.value / p.ratio
         voltage = p.resistance * torque_m / p.kt + p.kt * p.ratio * qd

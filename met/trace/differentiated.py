@@ -82,8 +82,12 @@ def dependence(recording: Recording, name: str, straight: Straight) -> Dependenc
 
 
 def _closed(recording: Recording, cells: set[str], more: Callable[[CodeSection], Iterable[str]]) -> frozenset[str]:
-    """All cells that follow from those found before, section by section; a section is examined again only where it
-    reads a new one."""
+    """The set `cells`, enlarged in place until no section of the program adds a cell to it.
+
+    more  the cells that a section adds, which it finds from the same set as it is then
+
+    A section is examined again only where it reads a cell that is new.
+    """
     reads = [
         {section.nodes[i][1] for i in section.order if section.nodes[i][0] == "cell"} for section in recording.sections
     ]
@@ -93,7 +97,7 @@ def _closed(recording: Recording, cells: set[str], more: Callable[[CodeSection],
         for number in waiting:
             cells |= set(more(recording.sections[number]))
         new = cells - before
-        waiting = [number for number, cells in enumerate(reads) if cells & new]
+        waiting = [number for number, cells_read in enumerate(reads) if cells_read & new]
     return frozenset(cells)
 
 

@@ -247,7 +247,10 @@ class Nodes:
         return None
 
     def both(self, a: int, b: int) -> int:
-        """A reference to the truth that both hold; to a simpler one where one will do."""
+        """A reference to the truth that both hold: a new node, or a, b or FALSE where that is the same.
+
+        FALSE and TRUE are the two least references, so only the lesser of a and b can be one of them.
+        """
         if a > b:
             a, b = b, a
         if a == FALSE or a ^ b == 1:

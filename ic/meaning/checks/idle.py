@@ -261,7 +261,11 @@ def _joints_between(structure: Structure, bodies: list[str]) -> list[str] | None
 
 
 def _remark_alone(scope: Scope, environment: Iterable[EnvironmentUse]) -> None:
-    """Report two models that give a quantity of which only one is allowed (`Environment.alone`)."""
+    """Warn (D338) of two models of the environment that give the same quantity, for what they do adds up.
+
+    `alone` of a model's declaration names the quantity from its values, or is "" for none. Models whose values vary are
+    passed over.
+    """
     first: dict[str, EnvironmentUse] = {}
     for load in environment:
         model = models.find("environment", load.model, load.place)

@@ -65,7 +65,8 @@ def _turns(run: RunNumbers) -> Iterator[Scale]:
 
 
 def _centres(run: RunNumbers) -> Iterator[Scale]:
-    """The distance of each link's centre of mass from its frame, beside the arm's reach."""
+    """The distance of each moving link's centre of mass from its frame, beside the arm's reach or, where that is more,
+    4 radii of gyration of the link. Lumped links, whose numbers are not those of a body, are left out."""
     usual = "of 470 links of published robots none is above 0.42"
     for link in run.structure.links:
         path = f"links.{link.name}.com"
@@ -369,7 +370,8 @@ def _bands(run: RunNumbers) -> Iterator[Scale]:
 
 
 def _payloads(run: RunNumbers) -> Iterator[Scale]:
-    """The mass of each payload, beside that of the links that move."""
+    """The mass of each payload on a link that moves, as a multiple of the mass of all such links: up to 200 is usual
+    under gravity, and up to 10,000 without."""
     arm = sum(run.numbers.get(f"links.{link}.mass", 0.0) for link in run.moved)
     high, typical, usual = 200.0, 0.2, "industrial robots lift a tenth to a third of their mass"
     if not run.gravity.any():

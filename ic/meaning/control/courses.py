@@ -57,9 +57,10 @@ def with_file_named(call: Call) -> Call:
 def use_file(
     scope: Scope, owner: Owner, profile: Profile, body: MergedBlock, name: str, kind: str = "joint"
 ) -> dict[str, Any] | None:
-    """Every parameter of a profile that reads a file, entered in the scope; None where one is missing or wrong.
+    """The values of a command's profile that follows a column of a CSV file, by parameter, also entered in the scope;
+    None where one is missing or wrong, which is reported.
 
-    name  of the column, unless another is named: that of the joint, or of what `kind` says
+    name  of the column where the deck names none: the name of the joint, or of another thing, of this `kind` in words
     """
     check_keys(scope, body, [declared.name for declared in profile.written], owner)
     of_file = (FILE.name, COLUMN.name)

@@ -218,7 +218,10 @@ class Checks:
                 self._refuse(check, cases, int(np.flatnonzero(bad)[0]), int(bad.sum()), causes)
 
     def _tables(self, values: Mapping[str, np.ndarray], count: int) -> Iterator[tuple[Check, np.ndarray]]:
-        """Every waiting check, with its values for `count` cases, [n, k]."""
+        """Each check that waits until the numbers of the cases are known, with its values, [case, number of the value].
+
+        values  the inputs of the checks' formulas by name, a number for each case;  count: of cases
+        """
         columns = iter(self._formulas().replay(values))
         for check in self._waiting:
             table = np.empty((count, len(check.values)))

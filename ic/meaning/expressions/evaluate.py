@@ -164,7 +164,8 @@ def _leaf(expression: Expression, lookup: Lookup) -> Value | ValueList:
 
 
 def _number(number: Number) -> Value:
-    """The value of a number with its unit, SI."""
+    """The value of a written number, in SI. One without a unit that is a multiple of pi may turn Hz into rad/s, so its
+    power of Hz is not known (None)."""
     if number.unit is None:
         hertz = None if _of_pi(number.text) else 0
         return Value(

@@ -128,7 +128,10 @@ class Truths:
         return np.asarray(HOLDS[expression.operator](left, right)) & ~(np.isnan(left) | np.isnan(right))
 
     def _comparison(self, expression: Binary) -> NumberComparison:
-        """A parsed comparison of numbers. Raises Problem where its sides cannot be compared."""
+        """A parsed comparison of numbers. Warns (D305) where one side is in Hz and the other in 1/s.
+
+        Raises Problem where the two have different dimensions.
+        """
         left, right = (evaluate_number(side, self.find) for side in (expression.left, expression.right))
         need_one_dimension(expression, left, right)
         if left.hertz is not None and right.hertz is not None and left.hertz != right.hertz:

@@ -212,7 +212,11 @@ def _where_real(loop: ScalarLoop) -> list[float]:
 
 
 def _where_size_is(loop: ScalarLoop, size: float) -> list[float]:
-    """Frequencies, rad/s up to Nyquist's, at which the size of the loop |L| has this value."""
+    """Frequencies, rad/s up to Nyquist's, at which the size of the loop |L| has this value.
+
+    They are eigenvalues of the pencil of |L|^2 = size^2, then refined on |L| itself. Nyquist's own is tried by itself,
+    for a root is refined from both of its sides.
+    """
     C, D = loop.C[None, :], loop.D
     last = [[D * C, C, np.array([[D * D - size * size]])]]
     frequencies = _roots(loop, last, by_output=True)

@@ -47,7 +47,8 @@ class InjectedBuilder(Builder):
         return replace(setpoint, value=setpoint.value + tape.read(ADDED + path)) if path in self._added else setpoint
 
     def compute(self, tape: Tape, actuator: Actuator, seen: Seen) -> None:
-        """Compute a servo's outputs, and add to them what is put in at the opened places."""
+        """Compute a servo's outputs, and add an input to each at which a loop is opened: the program is differentiated
+        by it."""
         super().compute(tape, actuator, seen)
         for output in actuator.parts.outputs:
             path = f"{actuator.path}.{output.name}"
