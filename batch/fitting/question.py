@@ -18,7 +18,7 @@ from batch.measured.log import mapped_column
 from batch.measured.residuals import Comparison, compare
 from ic.driver.explain import explanations_of
 from ic.driver.given_values import GivenRun, given_run, swept_run
-from ic.driver.write_values import WrittenValue
+from ic.driver.written_value import WrittenValue
 from ic.text.complaints import known_words
 from met.diagnostic import Problem, error
 from met.frozen import frozen

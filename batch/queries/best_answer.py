@@ -14,7 +14,7 @@ from batch.queries.pool import CaseColumn, failure_lines
 from batch.queries.signals import deck_unit, number_text, number_texts, pretty_unit
 from batch.queries.stability_words import KEPT, margin_words, stability_data, stability_texts, wrapped
 from batch.queries.summary import finite
-from ic.driver.write_values import WrittenValue
+from ic.driver.written_value import WrittenValue
 from ic.printing.columns import columns, count
 from met.diagnostic import Problem, error
 from met.frozen import frozen

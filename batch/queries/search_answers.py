@@ -20,7 +20,7 @@ from batch.queries.pool import Pool
 from batch.queries.requirements import GroupRequirement, group_requirements, outcomes
 from batch.queries.signals import number_text, pretty_unit
 from batch.queries.stability_words import KEPT, WIDTH, margin_words, stability_data, stability_texts, wrapped
-from ic.driver.write_values import WrittenValue
+from ic.driver.written_value import WrittenValue
 from ic.printing.columns import count
 from met.frozen import frozen
 from met.outputs import quoted, setting_option, setting_path

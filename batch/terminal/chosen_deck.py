@@ -7,7 +7,8 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from batch.archive.read import ArchiveFile
-from ic.driver.write_values import DeckWithValues, WrittenValue, with_values
+from ic.driver.write_values import DeckWithValues, with_values
+from ic.driver.written_value import WrittenValue
 from ic.formatting.files import write
 from ic.text.files import Files, decode, file_at
 from ic.text.limits import MOST_BYTES

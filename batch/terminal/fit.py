@@ -19,7 +19,7 @@ from batch.measured.residuals import Comparison
 from batch.queries.summary import finite
 from batch.terminal.chosen_deck import FittedValue
 from batch.terminal.residuals import doubt_lines, note_lines
-from ic.driver.write_values import WrittenValue
+from ic.driver.written_value import WrittenValue
 from ic.printing.columns import columns
 from met.outputs import quoted, setting_option
 from met.unit_parser import decimals

@@ -13,6 +13,7 @@ from pathlib import Path
 
 from ic.driver.compile import Compiled, Select, check
 from ic.driver.explain import explanations_of
+from ic.driver.written_value import WrittenValue
 from ic.formatting.formatter import formatted
 from ic.grammar.syntax import Deck, Entry, Group, Let
 from ic.read import read
@@ -21,26 +22,6 @@ from met.diagnostic import Place, Problem, error
 from met.frozen import frozen
 from met.plan.keys import structure_key
 from met.unit_parser import parse_unit, written
-
-
-@frozen
-class WrittenValue:
-    """A value for a deck: its path, SI value, and a unit to write it in ("" or "1": none)."""
-
-    path: str
-    si: float
-    unit: str
-
-    @property
-    def text(self) -> str:
-        """The value in a deck's syntax."""
-        return written(self.si, self.unit)
-
-    @property
-    def setting(self) -> str:
-        """The setting `PATH=VALUE`, for `--set`."""
-        return f"{self.path}={self.text}"
-
 
 REMARK = "// chosen "
 """Beginning of the comment on a line with a written value; the next value replaces it."""

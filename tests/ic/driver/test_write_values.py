@@ -7,7 +7,8 @@ from pathlib import Path
 import pytest
 
 import ic
-from ic.driver.write_values import DeckWithValues, WrittenValue, with_values
+from ic.driver.write_values import DeckWithValues, with_values
+from ic.driver.written_value import WrittenValue
 from met.diagnostic import Problem
 
 ARM = """#include <servos/rigid_gearbox.ic>
