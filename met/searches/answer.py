@@ -172,8 +172,8 @@ def _nearest_miss(
     metrics: Mapping[str, np.ndarray],
     requirements: Sequence[NamedLimit],
 ) -> NearestMiss | None:
-    """Of the candidates with a case that fails or misses a requirement, the one nearest to the candidate that `case` is
-    of; None where there is none.
+    """The candidate nearest to that of `case`, among those with a case that fails or misses a requirement;
+    None where there is none.
 
     table    the parameters that are chosen, of each case, [case, parameter]
     done     whether each case ran to its end;  metrics: by name, a value for each case
