@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-from batch.cli.quantities import SECONDS, Quantity, measured
+from batch.cli.quantities import SECONDS, QuantityOption, measured
 from batch.cli.run import until_terminated
 from met.cli import NO, YES, FiniteRange, check_options, deck_options, format_option, loudness_options
 from met.diagnostic import Problem
@@ -32,7 +32,7 @@ class Amount(click.ParamType):
         return amount
 
 
-EXCHANGES = Quantity(
+EXCHANGES = QuantityOption(
     "rate",
     "Hz",
     "`1 kHz` or `500 Hz`",

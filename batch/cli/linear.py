@@ -6,7 +6,7 @@ from typing import Any
 
 import click
 
-from batch.cli.quantities import Quantity
+from batch.cli.quantities import QuantityOption
 from met.cli import NO, YES, check_options, deck_options, format_option
 from met.messages.visible import say
 
@@ -19,7 +19,7 @@ EQUILIBRIUM = "write `2 s`; a `linear` block of the run has `at = equilibrium;`,
 @click.option("--of", metavar="LINEAR", help="Answer this `linear` block of the run. [its only one]")
 @click.option(
     "--at",
-    type=Quantity("instant", "s", "`2 s` or `250 ms`", equilibrium=EQUILIBRIUM),
+    type=QuantityOption("instant", "s", "`2 s` or `250 ms`", equilibrium=EQUILIBRIUM),
     metavar="TIME",
     help="The instant of the run, such as `2 s`. [0 s]",
 )

@@ -10,7 +10,7 @@ from typing import Any
 import click
 
 
-class Quantity(click.ParamType):
+class QuantityOption(click.ParamType):
     """An option's number with its unit, such as `90 s`, which is read as SI; a bare number is SI already.
 
     kind    what it is, in words: "time";  unit: SI
@@ -58,5 +58,7 @@ def measured(value: Any, si: str) -> float:
     return number_in_si
 
 
-SECONDS = Quantity("time", "s", "`90 s`, `5 min` or `1.5 h`", suits=lambda s: 0.0 < s < math.inf, beyond="to wait for")
-INSTANT = Quantity("instant", "s", "`2 s` or `250 ms`")
+SECONDS = QuantityOption(
+    "time", "s", "`90 s`, `5 min` or `1.5 h`", suits=lambda s: 0.0 < s < math.inf, beyond="to wait for"
+)
+INSTANT = QuantityOption("instant", "s", "`2 s` or `250 ms`")

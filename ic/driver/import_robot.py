@@ -17,7 +17,7 @@ from ic.robots.entries import ArmEntries, arm_entries
 from ic.robots.files import load
 from ic.robots.following import Treatment, without_mimics
 from ic.robots.mjcf import read as read_mjcf
-from ic.robots.robot import Link
+from ic.robots.robot import RobotLink
 from ic.robots.xml import MJCF, parse
 from ic.text.complaints import Complaints
 from ic.text.files import Files, FoundFile
@@ -61,7 +61,7 @@ def _meshes_from(folder: str, arm: ArmEntries) -> ArmEntries:
     if os.path.abspath(folder) == os.path.abspath(home) or not any(link.visuals for link in robot.links):
         return arm
 
-    def moved(link: Link) -> Link:
+    def moved(link: RobotLink) -> RobotLink:
         paths = (os.path.relpath(os.path.join(home, visual.path), folder or ".") for visual in link.visuals)
         visuals = (replace(visual, path=path) for visual, path in zip(link.visuals, paths, strict=True))
         return replace(link, visuals=tuple(visuals))

@@ -14,7 +14,7 @@ from ic.robots.attributes import printable
 from ic.robots.entries import LIMITS, ArmEntries, RobotEntry, spelled
 from ic.robots.following import hold_position
 from ic.robots.names import word
-from ic.robots.robot import MOVING, Inertial, Joint, Mimic, Robot
+from ic.robots.robot import MOVING, Inertial, Mimic, Robot, RobotJoint
 from ic.robots.warnings import in_other_units, incomplete, unseen_words
 from ic.text.edition import EDITION_WORD, LATEST
 
@@ -134,7 +134,7 @@ def _joint_notes(part: RobotEntry, changed: Mapping[tuple[str, str], str]) -> li
     """Remarks on a joint for a deck that is made from a robot's file: its name there, and what a deck has elsewhere."""
     notes = _called(part, "joint", changed)
     joint = part.source
-    assert isinstance(joint, Joint)
+    assert isinstance(joint, RobotJoint)
     if joint.type.text == "continuous":
         notes.append("continuous")
     if joint.followed is not None:
@@ -144,7 +144,7 @@ def _joint_notes(part: RobotEntry, changed: Mapping[tuple[str, str], str]) -> li
     return notes
 
 
-def _following(joint: Joint, mimic: Mimic) -> str:
+def _following(joint: RobotJoint, mimic: Mimic) -> str:
     """A note on a joint that follows another in the file."""
     law = {"multiplier": (mimic.multiplier, 1.0), "offset": (mimic.offset, 0.0)}
     shown_law = ", ".join(f"{name} {spelled(value)}" for name, (value, default) in law.items() if value != default)
@@ -166,7 +166,7 @@ def _runs(body: ArmEntries, arm: str) -> Iterator[str]:
     joints = {
         part.entry.words[1].text: part.source
         for part in body.joints
-        if isinstance(part.source, Joint) and part.source.type.text in MOVING
+        if isinstance(part.source, RobotJoint) and part.source.type.text in MOVING
     }
     if not joints:
         return
@@ -211,7 +211,7 @@ Laws = Mapping[str, Mapping[str, float]]
 
 
 def _passive_runs(
-    robot: Robot, joints: Mapping[str, Joint], taken: Collection[str]
+    robot: Robot, joints: Mapping[str, RobotJoint], taken: Collection[str]
 ) -> Iterator[tuple[str, str, Mapping[str, str], Laws]]:
     """Runs on the servo `passive` that the file has numbers for: name, comment, servos by joint, and their keys."""
 

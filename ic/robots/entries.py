@@ -28,7 +28,7 @@ from ic.grammar.syntax import (
     Word,
 )  # fmt: skip
 from ic.robots.names import DeckNames, deck_names
-from ic.robots.robot import MOVING, Inertial, Joint, Link, Numbers, Robot, Visual, Written
+from ic.robots.robot import MOVING, Inertial, Numbers, Robot, RobotJoint, RobotLink, Visual, Written
 from met.diagnostic import Place
 from met.frozen import frozen
 from met.plan import BASE
@@ -62,13 +62,13 @@ NOISE = 1e-15  # of sines and cosines of right angles, whose size is 1: cos(pi/2
 class RobotEntry:
     """A link or joint of the robot as an entry."""
 
-    source: Link | Joint
+    source: RobotLink | RobotJoint
     entry: Group
 
     @property
     def weighs(self) -> bool:
         """True for a link whose inertia the file has."""
-        return isinstance(self.source, Link) and self.source.inertial is not None
+        return isinstance(self.source, RobotLink) and self.source.inertial is not None
 
 
 @frozen
@@ -122,7 +122,7 @@ def _notes(robot: Robot) -> Iterator[tuple[Place, str]]:
             yield joint.limits_at, LEFT_OUT
 
 
-def _link(link: Link, name: str) -> Group:
+def _link(link: RobotLink, name: str) -> Group:
     """The entry of a link of a robot's file: mass (kg), centre of mass (m), inertia (kg m^2)."""
     inertial = link.inertial
     if inertial is None:
@@ -201,12 +201,12 @@ def _turn(angle: float) -> tuple[float, float]:
     return (0.0 if abs(c) < NOISE else c), (0.0 if abs(s) < NOISE else s)
 
 
-def _kind(joint: Joint) -> str:
+def _kind(joint: RobotJoint) -> str:
     """The kind of the joint in a deck."""
     return "revolute" if joint.type.text == "continuous" else joint.type.text
 
 
-def _joint(joint: Joint, names: DeckNames, kinds: Mapping[str, str]) -> Group:
+def _joint(joint: RobotJoint, names: DeckNames, kinds: Mapping[str, str]) -> Group:
     """The entry of a joint: its ends, frame, axis, limits, and what it follows."""
     kind = _kind(joint)
     settings = [_end("parent", joint.parent, names), _end("child", joint.child, names)]
@@ -233,7 +233,7 @@ def _joint(joint: Joint, names: DeckNames, kinds: Mapping[str, str]) -> Group:
     return _group("joint", names.joints[joint.name.text], Word(kind, joint.type.place), settings, joint.name.place)
 
 
-def limits(joint: Joint) -> dict[str, Numbers]:
+def limits(joint: RobotJoint) -> dict[str, Numbers]:
     """The limits of the joint: none of position where it is continuous, or where both ends are 0 or left out; else an
     end that is left out is 0. Infinite ones are none, and so are an effort and a velocity of 0."""
     if joint.type.text not in MOVING or joint.limits_at is None:

@@ -11,7 +11,7 @@ from dataclasses import replace
 from typing import Literal
 
 from ic.robots.entries import limits, rotation, rpy_of, spelled
-from ic.robots.robot import MOVING, Joint, Numbers, Robot
+from ic.robots.robot import MOVING, Numbers, Robot, RobotJoint
 
 Treatment = Literal["follow", "free", "fixed"]
 
@@ -20,7 +20,7 @@ def without_mimics(robot: Robot, treatment: Treatment) -> Robot:
     """The robot with its followers freed, or fixed where they are; `print_deck` names them."""
     known = {joint.name.text: joint for joint in robot.joints}
 
-    def changed(joint: Joint) -> Joint:
+    def changed(joint: RobotJoint) -> RobotJoint:
         """A joint that imitates another, free or held where it is; others as they are."""
         if joint.mimic is None:
             return joint
@@ -33,7 +33,7 @@ def without_mimics(robot: Robot, treatment: Treatment) -> Robot:
     return replace(robot, joints=tuple(changed(joint) for joint in robot.joints))
 
 
-def position(joint: Joint, known: dict[str, Joint]) -> float:
+def position(joint: RobotJoint, known: dict[str, RobotJoint]) -> float:
     """The position of a joint at the start, rad or m; a follower is where its leader puts it. known: all joints by
     name"""
     chain = [joint]
@@ -46,14 +46,14 @@ def position(joint: Joint, known: dict[str, Joint]) -> float:
     return value + 0.0
 
 
-def _beyond(joint: Joint, value: float) -> str:
+def _beyond(joint: RobotJoint, value: float) -> str:
     """The limits that a position is beyond, in words: `its limits, -1.5 to 1.5`; "" within them."""
     ends = {name: limit.values[0] for name, limit in limits(joint).items()}
     lower, upper = ends.get("lower", -math.inf), ends.get("upper", math.inf)
     return "" if lower <= value <= upper else f"its limits, {spelled(lower)} to {spelled(upper)}"
 
 
-def hold_position(joint: Joint) -> float:
+def hold_position(joint: RobotJoint) -> float:
     """The position at which a deck's first run holds a joint: the file's, else 0, or the middle of its range where that
     excludes 0."""
     if joint.type.text not in MOVING:
@@ -69,7 +69,7 @@ def hold_position(joint: Joint) -> float:
     return short if lower <= short <= upper else middle
 
 
-def _fixed(joint: Joint, value: float) -> Joint:
+def _fixed(joint: RobotJoint, value: float) -> RobotJoint:
     """The joint made a fixed one, whose child lies where it would at this position (m or rad)."""
     fixed = replace(joint, type=replace(joint.type, text="fixed"), axis=None)
     if joint.type.text not in MOVING or value == 0.0:

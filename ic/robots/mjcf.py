@@ -20,7 +20,7 @@ from ic.robots.attributes import printable
 from ic.robots.entries import rpy_of
 from ic.robots.mjcf_model import BALL, FREE, SLIDE
 from ic.robots.mjcf_xml import MjcfSource, source_of
-from ic.robots.robot import Inertial, Joint, Link, Mimic, Numbers, Robot, Visual, Written
+from ic.robots.robot import Inertial, Mimic, Numbers, Robot, RobotJoint, RobotLink, Visual, Written
 from ic.robots.visuals import Unseen, beside, three
 from ic.robots.xml import Element
 from ic.text.files import Files
@@ -67,7 +67,7 @@ def read(root: Element, path: str, files: Files) -> Robot:
     inertials = [None, *(_inertial(body, source) for body in bodies)]
     unseen: dict[str, list[Element]] = {}
     visuals = _visuals(model["looks"], source, os.path.dirname(path), carriers, base, unseen)
-    links, arm_joints = [Link(names[base], inertials[base], visuals.get(base, ()))], list[Joint]()
+    links, arm_joints = [RobotLink(names[base], inertials[base], visuals.get(base, ()))], list[RobotJoint]()
     for number, body in enumerate(bodies, 1):
         name = names[number]
         if carriers[number] != base:
@@ -78,10 +78,15 @@ def read(root: Element, path: str, files: Files) -> Robot:
                 names[body["parent"]],
                 *(new_name(name, f"{name.text}_on_{joint['name']}") for joint in own_joints[:-1]),
             ]
-            links += [*(Link(end, None) for end in ends[1:]), Link(name, inertials[number], visuals.get(number, ()))]
+            links += [
+                *(RobotLink(end, None) for end in ends[1:]),
+                RobotLink(name, inertials[number], visuals.get(number, ())),
+            ]
             if not own_joints:
                 mount = new_name(name, f"{name.text}_mount")
-                arm_joints.append(Joint(mount, Written("fixed", name.place), ends[0], name, *_frame(body, name.place)))
+                arm_joints.append(
+                    RobotJoint(mount, Written("fixed", name.place), ends[0], name, *_frame(body, name.place))
+                )
             for joint, parent, child in zip(own_joints, ends, [*ends[1:], name], strict=False):
                 title = _written(source, "joint", joint["name"])
                 arm_joints.append(_joint(joint, title, parent, child, model["key"] is not None))
@@ -210,14 +215,14 @@ def _frame(part: Mapping[str, Any], place: Place) -> tuple[Numbers, Numbers]:
     return Numbers(tuple(part["at"]), place), Numbers(rpy_of(part["R"]), place)
 
 
-def _joint(joint: Mapping[str, Any], name: Written, parent: Written, child: Written, has_key: bool) -> Joint:
+def _joint(joint: Mapping[str, Any], name: Written, parent: Written, child: Written, has_key: bool) -> RobotJoint:
     """The joint of an arm from one of MuJoCo's model (`mjcf_model.compiled_model`), SI. has_key: whether a keyframe
     gives all positions at the start, so that one of 0 counts too"""
     place, ends = name.place, joint["range"] or ()
     limits = {end: Numbers((value,), place) for end, value in zip(("lower", "upper"), ends, strict=False)}
     limits |= {"effort": Numbers((joint["effort"],), place)} if joint["effort"] else {}
     kind = "prismatic" if joint["kind"] == SLIDE else "revolute" if ends else "continuous"
-    return Joint(
+    return RobotJoint(
         name,
         Written(kind, place),
         parent,

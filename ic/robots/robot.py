@@ -71,7 +71,7 @@ class Visual:
 
 
 @frozen
-class Link:
+class RobotLink:
     """A link; visuals: its meshes that exist, whichever reader found them."""
 
     name: Written
@@ -89,7 +89,7 @@ class Mimic:
 
 
 @frozen
-class Joint:
+class RobotJoint:
     """A joint; axis in its own frame, as written.
 
     limits    lower, upper, effort, velocity: those that are written, infinite where none is meant; `limits_at` the
@@ -137,9 +137,9 @@ class Robot:
 
     file: str
     name: str
-    links: tuple[Link, ...]
-    joints: tuple[Joint, ...]
-    root: Link
+    links: tuple[RobotLink, ...]
+    joints: tuple[RobotJoint, ...]
+    root: RobotLink
     dropped: Mapping[str, tuple[Element, ...]]
     unseen: Mapping[str, tuple[Element, ...]] = field(default_factory=dict)
     gravity: tuple[float, float, float] = (0.0, 0.0, -9.81)
@@ -148,6 +148,6 @@ class Robot:
     format: str = "URDF"
 
     @property
-    def carried(self) -> tuple[Link, ...]:
+    def carried(self) -> tuple[RobotLink, ...]:
         """The links of the arm, without the root."""
         return tuple(link for link in self.links if link is not self.root)

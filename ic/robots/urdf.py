@@ -11,7 +11,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 from ic.robots.attributes import XACRO, Found, printable, read_element
-from ic.robots.robot import Inertial, Joint, Link, Mimic, Numbers, Robot
+from ic.robots.robot import Inertial, Mimic, Numbers, Robot, RobotJoint, RobotLink
 from ic.robots.visuals import link_visuals
 from ic.robots.xml import MJCF, Element, parse
 from ic.text.complaints import Complaints, known_words
@@ -92,9 +92,9 @@ def _within(root: Element) -> Iterator[Element]:
         stack.extend(reversed(element.children))
 
 
-def _link(element: Found) -> Link:
+def _link(element: Found) -> RobotLink:
     inertial = element.inside.get("inertial")
-    return Link(element.words["name"], None if inertial is None else _inertial(inertial))
+    return RobotLink(element.words["name"], None if inertial is None else _inertial(inertial))
 
 
 def _inertial(element: Found) -> Inertial:
@@ -114,12 +114,12 @@ def _origin(element: Found) -> tuple[Numbers | None, Numbers | None]:
     return (None, None) if origin is None else (origin.numbers.get("xyz"), origin.numbers.get("rpy"))
 
 
-def _joint(element: Found) -> Joint:
+def _joint(element: Found) -> RobotJoint:
     """The joint of an element; of what it does not have, None or nothing."""
     position, rpy = _origin(element)
     axis, limit, dynamics = (element.inside.get(tag) for tag in ("axis", "limit", "dynamics"))
     friction = {} if dynamics is None else {name: numbers.values[0] for name, numbers in dynamics.numbers.items()}
-    return Joint(
+    return RobotJoint(
         element.words["name"],
         element.words["type"],
         element.inside["parent"].words["link"],
@@ -143,7 +143,7 @@ def _mimic(element: Found | None) -> Mimic | None:
     return Mimic(element.words["joint"], law.get("multiplier", 1.0), law.get("offset", 0.0))
 
 
-def _check_names(named: Sequence[Link] | Sequence[Joint], kind: str, complaints: Complaints) -> None:
+def _check_names(named: Sequence[RobotLink] | Sequence[RobotJoint], kind: str, complaints: Complaints) -> None:
     """Report links, or joints, of one name (D204)."""
     first: dict[str, Place] = {}
     for element in named:
@@ -158,7 +158,7 @@ def _check_names(named: Sequence[Link] | Sequence[Joint], kind: str, complaints:
         first.setdefault(element.name.text, element.name.place)
 
 
-def _check_ends(links: Sequence[Link], joints: Sequence[Joint], complaints: Complaints) -> None:
+def _check_ends(links: Sequence[RobotLink], joints: Sequence[RobotJoint], complaints: Complaints) -> None:
     """Check that every joint is between existing links."""
     names = {link.name.text for link in links}
     for joint in joints:
@@ -173,7 +173,7 @@ def _check_ends(links: Sequence[Link], joints: Sequence[Joint], complaints: Comp
                 )
 
 
-def _check_mimics(joints: Sequence[Joint], complaints: Complaints) -> None:
+def _check_mimics(joints: Sequence[RobotJoint], complaints: Complaints) -> None:
     """Check that each joint that follows another follows, in the end, an existing one that moves by itself."""
     followed = {joint.name.text: joint.mimic for joint in joints}
     in_circles: set[str] = set()
@@ -206,7 +206,7 @@ def _check_mimics(joints: Sequence[Joint], complaints: Complaints) -> None:
             )
 
 
-def _root(element: Element, links: Sequence[Link], joints: Sequence[Joint]) -> Link:
+def _root(element: Element, links: Sequence[RobotLink], joints: Sequence[RobotJoint]) -> RobotLink:
     """The link that no joint carries. Raises Problem D209 where there is none or more than one, or it carries
     nothing."""
     carried = {joint.child.text for joint in joints}

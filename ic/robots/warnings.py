@@ -9,7 +9,7 @@ from collections.abc import Iterator, Sequence
 
 from ic.robots.attributes import printable
 from ic.robots.entries import ArmEntries, spelled
-from ic.robots.robot import MOVING, Joint, Numbers, Robot
+from ic.robots.robot import MOVING, Numbers, Robot, RobotJoint
 from ic.robots.urdf import MOMENTS
 from ic.text.complaints import and_more, counted
 from met.diagnostic import Diagnostic, Label, Place
@@ -80,7 +80,7 @@ def unseen_words(count: int) -> str:
     return f"not drawn: {count} mesh{'es' * (count != 1)}"
 
 
-def _joints(body: ArmEntries, joints: Sequence[Joint]) -> str:
+def _joints(body: ArmEntries, joints: Sequence[RobotJoint]) -> str:
     names = [body.names.joints[joint.name.text] for joint in joints]
     listed = names if len(names) <= MOST_JOINTS else [*names[:2], "...", names[-1]]
     return f"{counted(len(names), 'joint')} ({', '.join(listed)})"

@@ -25,7 +25,7 @@ class Floating:
     """The base as a body, in the recursion's base frame.
 
     body     inertia of all links that are fixed to the base, its own included
-    dynamic  the same with what the joints on it do not see of theirs (`Joint.dynamic`)
+    dynamic  the same with what the joints on it do not see of theirs (`TreeJoint.dynamic`)
     mass, reach   of all that hangs together at q = 0: kg, and the trace of its inertia about the frame's origin,
              kg m^2; 0.0 where cases vary it
     """

@@ -52,7 +52,7 @@ Moving = Literal["revolute", "prismatic"]
 
 
 @frozen
-class Joint:
+class TreeJoint:
     """A moving joint with the rigid body that it carries (fixed joints outboard merged into it).
 
     parent   number of the joint that carries the parent link, -1 for the base

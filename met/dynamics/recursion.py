@@ -67,7 +67,7 @@ Wrench = tuple[Vector, Vector]
 """Moment about a frame's origin (N m) and force (N), in that frame's axes."""
 
 SINGULAR = 1e-13
-"""Share of the outboard inertia (`Joint.reach`) below which D is rounding noise: some hundred roundings."""
+"""Share of the outboard inertia (`TreeJoint.reach`) below which D is rounding noise: some hundred roundings."""
 
 
 class FreeRotor(NamedTuple):

@@ -1,7 +1,7 @@
 """The arm as the recursion sees it: moving joints in frames of its own choice, fixed joints merged away.
 
 A `Body` is the description from a deck: a link, the joint that carries it, its place, and its inertia. `Tree.build`
-turns bodies into `Joint`s once, so that the work repeated at every instant is as small as the structure allows:
+turns bodies into `TreeJoint`s once, so that the work repeated at every instant is as small as the structure allows:
 
 1. Links behind fixed joints become part of the link that carries them (or of the base).
 2. Each link frame is turned so that its joint's axis is z. Where the joint that follows is known when the tree is
@@ -24,7 +24,7 @@ from dataclasses import fields, is_dataclass, replace
 from typing import Any, Literal
 
 from met.dynamics.floating import Floating
-from met.dynamics.joints import Joint, JointTransform, X, Z
+from met.dynamics.joints import JointTransform, TreeJoint, X, Z
 from met.dynamics.spatial import (
     HERE,
     IDENTITY,
@@ -111,7 +111,7 @@ class Tree:
     floating the base as a body, where it moves freely; None: its motion is given
     """
 
-    joints: tuple[Joint, ...]
+    joints: tuple[TreeJoint, ...]
     order: tuple[int, ...]
     base: Pose
     frames: dict[str, Frame]
@@ -181,7 +181,7 @@ class _Builder:
         whether the base moves freely, so that its own inertia counts."""
         own: list[Pose] = [HERE] * len(self.links)
         base = HERE
-        joints: list[Joint | None] = [None] * len(self.links)
+        joints: list[TreeJoint | None] = [None] * len(self.links)
         for i in self.order:
             body = self.bodies[self.links[i]]
             own[i] = self._own(i)
@@ -200,7 +200,7 @@ class _Builder:
             angle = 0.0
             if body.kind == "revolute" and all_constant(zero) and 0.0 not in zero:
                 angle, zero = math.atan2(zero[1], zero[0]), NO_TURN
-            joints[i] = Joint(
+            joints[i] = TreeJoint(
                 name=body.joint,
                 kind=body.kind,  # type: ignore[arg-type]
                 parent=self.parent[i],
@@ -323,7 +323,9 @@ def _direction(x: Real, y: Real) -> Turn:
     return choose(nothing, 1.0, x / length), choose(nothing, 0.0, y / length)
 
 
-def _regrouped(joints: list[Joint], order: Sequence[int], ground: Rigid | None) -> tuple[list[Joint], Rigid | None]:
+def _regrouped(
+    joints: list[TreeJoint], order: Sequence[int], ground: Rigid | None
+) -> tuple[list[TreeJoint], Rigid | None]:
     """The joints with `dynamic`: from tips to base, inertia that the joint's motion does not see goes to the parent;
     and the base's body with its share (None: it is not needed)."""
     result = list(joints)
@@ -352,7 +354,9 @@ def _less(a: Real, b: Real) -> Real:
     return a - b
 
 
-def _with_reach(joints: list[Joint], order: Sequence[int], ground: Rigid | None) -> tuple[list[Joint], Rigid | None]:
+def _with_reach(
+    joints: list[TreeJoint], order: Sequence[int], ground: Rigid | None
+) -> tuple[list[TreeJoint], Rigid | None]:
     """The joints with `reach`, where no case varies it; and all bodies at q = 0 combined, about the base."""
     result = list(joints)
     composite = [joint.body for joint in joints]
